@@ -1,0 +1,86 @@
+//! What can go wrong, in words that name the place and the remedy.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use miette::{Diagnostic, NamedSource, SourceSpan};
+
+/// The result of every fallible operation of this library.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Everything that can stop a run. Inputs are never half-accepted: an error means that nothing was written
+/// for the input it names.
+#[derive(Debug, thiserror::Error, Diagnostic)]
+pub enum Error {
+    /// A scene file says something that cannot be built; carries the text and the place.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Scene(Box<SceneError>),
+
+    /// A mesh, a table, a parameter or an organ is wrong.
+    #[error("{subject}: {problem}")]
+    #[diagnostic(help("{remedy}"))]
+    Input {
+        /// The file, organ or parameter at fault, with the element where one is known.
+        subject: String,
+        /// What is wrong with it.
+        problem: String,
+        /// What the user can do about it.
+        remedy: String,
+    },
+
+    /// The operating system refused to read or write.
+    #[error("cannot {action} {}", path.display())]
+    Io {
+        /// What was being done, as an infinitive: `read`, `create`, `write`, `replace`.
+        action: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's reason.
+        #[source]
+        source: io::Error,
+    },
+
+    /// The user asked to stop (Ctrl-C, termination). No target file was left half-written.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// An error with its place in a scene file.
+#[derive(Debug, thiserror::Error, Diagnostic)]
+#[error("{message}")]
+pub struct SceneError {
+    /// What is wrong.
+    pub message: String,
+    /// The scene file's name and text.
+    #[source_code]
+    pub source_code: NamedSource<String>,
+    /// Where it is wrong.
+    #[label("{label}")]
+    pub span: Option<SourceSpan>,
+    /// What the marked text is.
+    pub label: String,
+    /// What the user can do about it.
+    #[help]
+    pub remedy: Option<String>,
+}
+
+impl Error {
+    /// A wrong input: who, what, and what to do.
+    pub fn input(subject: impl Into<String>, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self::Input { subject: subject.into(), problem: problem.into(), remedy: remedy.into() }
+    }
+
+    /// The operating system's refusal, with what was being done to which path.
+    pub fn io(action: &'static str, path: &Path, source: io::Error) -> Self {
+        Self::Io { action, path: path.to_owned(), source }
+    }
+
+    /// The process exit code of this error: 130 for an interruption, 2 for everything else.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Interrupted => 130,
+            _ => 2,
+        }
+    }
+}

@@ -1,0 +1,6 @@
+//! Exact and interpolated intersection lengths of rays with organs.
+
+pub mod error;
+pub mod geometry;
+
+pub use error::{Error, Result};

@@ -1,0 +1,3 @@
+//! The `chordfield` command.
+
+fn main() {}
