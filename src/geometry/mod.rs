@@ -1,11 +1,27 @@
 //! Lines, intervals and surfaces. Knows nothing of scenes, trees or files. All lengths are millimetres.
 
 mod bounds;
+mod boxtree;
+mod closed;
+mod convex;
+mod fault;
+mod inside;
 mod interval;
 mod line;
 mod mesh;
+pub mod numeric;
+pub mod predicates;
+pub mod primitives;
+mod relation;
+mod topology;
 
 pub use bounds::Bounds;
+pub use boxtree::BoxTree;
+pub use closed::ClosedMesh;
+pub use convex::{ConvexMesh, NotConvex, Plane, rounding_tolerance_mm};
+pub use fault::{MeshFault, Notice, Place};
+pub use inside::Side;
 pub use interval::Interval;
 pub use line::{Line, Segment, UnitDir};
 pub use mesh::TriMesh;
+pub use relation::{Relation, relation, self_crossing};

@@ -1,0 +1,88 @@
+//! Exact chords: the judge of every approximation and the fall-back of every query.
+//!
+//! | engine | bodies | cost per ray | error |
+//! |---|---|---|---|
+//! | [`clip`] | convex | every face plane | γ₈ of the distance, as a shift of the line |
+//! | [`bvh`] | any closed surface | faces near the line | γ₈ of the distance, as a shift of the line |
+
+pub mod bvh;
+pub mod clip;
+
+use glam::DVec3;
+
+use crate::geometry::{Bounds, ClosedMesh, ConvexMesh, Interval, Line, NotConvex, Segment};
+use clip::ConvexClipper;
+
+/// A closed body, ready for exact chords.
+#[derive(Clone, Debug)]
+pub struct Body {
+    form: Form,
+}
+
+#[derive(Clone, Debug)]
+enum Form {
+    Convex { mesh: ConvexMesh, clipper: ConvexClipper },
+    General { surface: ClosedMesh, why: NotConvex },
+}
+
+impl Body {
+    /// The body inside `surface`: clipped if it proves convex, otherwise traced by its box hierarchy.
+    pub fn new(surface: ClosedMesh) -> Self {
+        let form = match ConvexMesh::new(surface) {
+            Ok(mesh) => Form::Convex { clipper: ConvexClipper::new(&mesh), mesh },
+            Err((surface, why)) => Form::General { surface, why },
+        };
+        Self { form }
+    }
+
+    /// Its surface.
+    pub fn surface(&self) -> &ClosedMesh {
+        match &self.form {
+            Form::Convex { mesh, .. } => mesh.surface(),
+            Form::General { surface, .. } => surface,
+        }
+    }
+
+    /// The proof that it is convex, or why it is not.
+    pub fn convexity(&self) -> Result<&ConvexMesh, &NotConvex> {
+        match &self.form {
+            Form::Convex { mesh, .. } => Ok(mesh),
+            Form::General { why, .. } => Err(why),
+        }
+    }
+
+    /// The box around it, mm.
+    pub fn bounds(&self) -> Bounds {
+        self.surface().bounds()
+    }
+
+    /// Whether `point` lies in the body or on its surface. Exact.
+    pub fn contains(&self, point: DVec3) -> bool {
+        self.surface().side_of(point) != crate::geometry::Side::Outside
+    }
+
+    /// The parts of `line` in the body, mm along `dir`, in order and disjoint; written to `parts`.
+    pub fn chords(&self, line: &Line, parts: &mut Vec<Interval>) {
+        match &self.form {
+            Form::Convex { clipper, .. } => {
+                parts.clear();
+                parts.extend(clipper.chord(line));
+            }
+            Form::General { surface, .. } => bvh::chords(surface, line, parts),
+        }
+    }
+
+    /// The parts of `segment` in the body, mm from its source, in order and disjoint; written to `parts`. A source
+    /// or a target inside the body cuts its chord there.
+    pub fn chords_of_segment(&self, segment: &Segment, parts: &mut Vec<Interval>) {
+        self.chords(segment.line(), parts);
+        let reach = Interval::new(0.0, segment.length_mm()).unwrap_or(Interval::EVERYTHING);
+        parts.retain_mut(|part| match part.intersection(&reach) {
+            Some(within) if within.length() > 0.0 => {
+                *part = within;
+                true
+            }
+            _ => false,
+        });
+    }
+}

@@ -1,0 +1,224 @@
+//! A hierarchy of boxes over numbered items: what rays, points and other hierarchies search.
+
+use std::ops::ControlFlow;
+
+use glam::DVec3;
+
+use super::Bounds;
+
+/// Items in a leaf; below this a split costs more than it saves.
+const LEAF_ITEMS: usize = 4;
+/// Candidate planes per axis for the surface-area heuristic.
+const BINS: usize = 16;
+
+/// A binary hierarchy of boxes, split by the surface-area heuristic over binned centres
+/// (Wald 2007, doi:10.1109/RT.2007.4342588). Nodes lie in depth-first order: the left child follows its parent.
+#[derive(Clone, Debug)]
+pub struct BoxTree {
+    nodes: Vec<Node>,
+    items: Vec<u32>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    bounds: Bounds,
+    /// Leaf: first item. Inner node: index of the right child.
+    start: u32,
+    /// Items in a leaf; 0 marks an inner node.
+    count: u32,
+}
+
+impl BoxTree {
+    /// The hierarchy over `boxes`; item `i` is `boxes[i]`. Deterministic.
+    pub fn build(boxes: &[Bounds]) -> Self {
+        let mut items: Vec<u32> = (0..boxes.len() as u32).collect();
+        let mut nodes = Vec::with_capacity(boxes.len());
+        split(boxes, &mut items, 0, &mut nodes);
+        Self { nodes, items }
+    }
+
+    /// The box around everything; empty if there are no items.
+    pub fn bounds(&self) -> Bounds {
+        self.nodes.first().map_or(Bounds::EMPTY, |n| n.bounds)
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        std::mem::size_of_val(&*self.nodes) + std::mem::size_of_val(&*self.items)
+    }
+
+    /// Calls `item` for each item in every leaf all of whose ancestors `enter` accepts.
+    ///
+    /// `enter` may grow stricter as items are seen, which makes this a branch-and-bound search.
+    pub fn visit(&self, mut enter: impl FnMut(&Bounds) -> bool, mut item: impl FnMut(u32)) {
+        // The depth is bounded by the median fall-back in `split`; a Vec guards against the rest.
+        let mut pending: Vec<u32> = Vec::with_capacity(64);
+        if !self.nodes.is_empty() {
+            pending.push(0);
+        }
+        while let Some(index) = pending.pop() {
+            let node = &self.nodes[index as usize];
+            if !enter(&node.bounds) {
+                continue;
+            }
+            if node.count == 0 {
+                pending.push(node.start);
+                pending.push(index + 1);
+            } else {
+                let range = node.start as usize..(node.start + node.count) as usize;
+                self.items[range].iter().for_each(|&i| item(i));
+            }
+        }
+    }
+
+    /// Calls `pair` for each pair of items (one of each hierarchy) in leaves whose boxes touch, until it breaks.
+    pub fn overlapping_pairs<B>(
+        &self,
+        other: &Self,
+        mut pair: impl FnMut(u32, u32) -> ControlFlow<B>,
+    ) -> ControlFlow<B> {
+        let mut pending = Vec::new();
+        if !self.nodes.is_empty() && !other.nodes.is_empty() {
+            pending.push((0u32, 0u32));
+        }
+        while let Some((i, j)) = pending.pop() {
+            let (a, b) = (&self.nodes[i as usize], &other.nodes[j as usize]);
+            if !a.bounds.touches(&b.bounds) {
+                continue;
+            }
+            let a_is_larger = a.bounds.area() >= b.bounds.area();
+            match (a.count, b.count) {
+                (0, bc) if bc > 0 || a_is_larger => pending.extend([(a.start, j), (i + 1, j)]),
+                (_, 0) => pending.extend([(i, b.start), (i, j + 1)]),
+                _ => {
+                    for &p in &self.items[a.start as usize..(a.start + a.count) as usize] {
+                        for &q in &other.items[b.start as usize..(b.start + b.count) as usize] {
+                            pair(p, q)?;
+                        }
+                    }
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+fn split(boxes: &[Bounds], items: &mut [u32], first: usize, nodes: &mut Vec<Node>) {
+    if items.is_empty() {
+        return;
+    }
+    let bounds = items.iter().fold(Bounds::EMPTY, |b, &i| b.union(boxes[i as usize]));
+    let index = nodes.len();
+    nodes.push(Node { bounds, start: first as u32, count: items.len() as u32 });
+    if items.len() <= LEAF_ITEMS {
+        return;
+    }
+    let middle = partition(boxes, items);
+    let (left, right) = items.split_at_mut(middle);
+    split(boxes, left, first, nodes);
+    nodes[index].start = nodes.len() as u32;
+    nodes[index].count = 0;
+    split(boxes, right, first + middle, nodes);
+}
+
+/// Reorders `items` so that the cheapest split is at the returned place, strictly inside.
+fn partition(boxes: &[Bounds], items: &mut [u32]) -> usize {
+    let centre = |i: u32| boxes[i as usize].centre();
+    let centres = Bounds::of(items.iter().map(|&i| centre(i)));
+    let extent = centres.size();
+    let bin_of = |axis: usize, p: DVec3| -> usize {
+        let x = (p[axis] - centres.min[axis]) / extent[axis];
+        ((x * BINS as f64) as usize).min(BINS - 1)
+    };
+
+    let mut best: Option<(f64, usize, usize)> = None;
+    for axis in (0..3).filter(|&a| extent[a] > 0.0) {
+        let mut bins = [(Bounds::EMPTY, 0usize); BINS];
+        for &i in items.iter() {
+            let bin = &mut bins[bin_of(axis, centre(i))];
+            *bin = (bin.0.union(boxes[i as usize]), bin.1 + 1);
+        }
+        for cut in 1..BINS {
+            let gather = |part: &[(Bounds, usize)]| {
+                part.iter().fold((Bounds::EMPTY, 0), |(b, n), bin| (b.union(bin.0), n + bin.1))
+            };
+            let ((left, nl), (right, nr)) = (gather(&bins[..cut]), gather(&bins[cut..]));
+            if nl == 0 || nr == 0 {
+                continue;
+            }
+            let cost = left.area() * nl as f64 + right.area() * nr as f64;
+            if best.is_none_or(|(least, ..)| cost < least) {
+                best = Some((cost, axis, cut));
+            }
+        }
+    }
+
+    // A split that leaves nearly all on one side would make the tree as deep as it has items.
+    let smallest_side = items.len() / 16;
+    if let Some((_, axis, cut)) = best {
+        items.sort_by_key(|&i| (bin_of(axis, centre(i)), i));
+        let middle = items.partition_point(|&i| bin_of(axis, centre(i)) < cut);
+        if middle.min(items.len() - middle) >= smallest_side.max(1) {
+            return middle;
+        }
+    }
+    let longest = if extent.x >= extent.y.max(extent.z) { 0 } else { 1 + usize::from(extent.z > extent.y) };
+    items.sort_by(|&i, &j| centre(i)[longest].total_cmp(&centre(j)[longest]).then(i.cmp(&j)));
+    items.len() / 2
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+
+    fn random_boxes(seed: u64, count: usize) -> Vec<Bounds> {
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(seed);
+        let mut point = |scale: f64| scale * DVec3::new(rng.random(), rng.random(), rng.random());
+        (0..count)
+            .map(|_| {
+                let min = point(100.0);
+                Bounds { min, max: min + point(10.0) }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn visiting_a_window_finds_what_brute_force_finds() {
+        let boxes = random_boxes(1, 500);
+        let tree = BoxTree::build(&boxes);
+        let window = Bounds { min: DVec3::splat(20.0), max: DVec3::splat(45.0) };
+        let mut found = Vec::new();
+        tree.visit(|b| b.touches(&window), |i| found.push(i));
+        found.retain(|&i| boxes[i as usize].touches(&window));
+        found.sort_unstable();
+        let brute: Vec<u32> = (0..500).filter(|&i| boxes[i as usize].touches(&window)).collect();
+        assert!(!brute.is_empty());
+        assert_eq!(found, brute);
+    }
+
+    #[test]
+    fn overlapping_pairs_are_those_of_brute_force() {
+        let (a, b) = (random_boxes(2, 120), random_boxes(3, 90));
+        let mut found = Vec::new();
+        let _ = BoxTree::build(&a).overlapping_pairs(&BoxTree::build(&b), |i, j| {
+            if a[i as usize].touches(&b[j as usize]) {
+                found.push((i, j));
+            }
+            ControlFlow::<()>::Continue(())
+        });
+        found.sort_unstable();
+        let all = (0..120u32).flat_map(|i| (0..90u32).map(move |j| (i, j)));
+        let brute: Vec<_> = all.filter(|&(i, j)| a[i as usize].touches(&b[j as usize])).collect();
+        assert_eq!(found, brute);
+    }
+
+    #[test]
+    fn ten_thousand_equal_boxes_do_not_overflow_the_stack() {
+        let boxes = vec![Bounds { min: DVec3::ZERO, max: DVec3::ONE }; 10_000];
+        let mut count = 0;
+        BoxTree::build(&boxes).visit(|_| true, |_| count += 1);
+        assert_eq!(count, 10_000);
+    }
+}

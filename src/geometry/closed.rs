@@ -1,0 +1,305 @@
+//! Closed surfaces: what a raw mesh must prove before any ray meets it.
+//!
+//! ```text
+//! TriMesh ──► finite? faces? ──► every edge in two faces? ──► one winding per component ──► outward ──► ClosedMesh
+//!               (fault)              (fault: open,                (turned, notice)          (turned,
+//!                                     not manifold)                                          notice)
+//! ```
+
+use glam::DVec3;
+
+use super::boxtree::BoxTree;
+use super::fault::{MeshFault, Notice};
+use super::inside::{Side, side_of_surface, winding_around};
+use super::topology::{Components, Edges};
+use super::{Bounds, TriMesh};
+
+/// A closed, 2-manifold, outward-looking surface, and the box hierarchy over its faces.
+///
+/// Several components are allowed: side by side, or as a cavity (inward-looking, inside another). That the surface
+/// does not cross itself is proved separately, by `self_crossing`, because bodies
+/// made as convex hulls cannot.
+#[derive(Clone, Debug)]
+pub struct ClosedMesh {
+    mesh: TriMesh,
+    components: Vec<u32>,
+    component_count: usize,
+    edges: Edges,
+    tree: BoxTree,
+}
+
+impl ClosedMesh {
+    /// Proves that `mesh` is closed, turning faces outward where the file had them wrong; each repair is a notice.
+    ///
+    /// # Errors
+    /// The first fault found, with its place: see [`MeshFault`].
+    pub fn new(mut mesh: TriMesh) -> Result<(Self, Vec<Notice>), MeshFault> {
+        let mut notices = Vec::new();
+        check_numbers(&mesh)?;
+        let before = mesh.faces.len();
+        mesh.faces.retain(|&[a, b, c]| a != b && b != c && c != a);
+        if mesh.faces.len() < before {
+            notices.push(Notice::CollapsedFaces(before - mesh.faces.len()));
+        }
+        if mesh.faces.is_empty() {
+            return Err(MeshFault::Empty);
+        }
+        drop_unused_vertices(&mut mesh, &mut notices);
+
+        let mut edges = Edges::new(&mesh)?;
+        let turned = edges.make_winding_consistent(&mut mesh)?;
+        if turned > 0 {
+            notices.push(Notice::TurnedFaces { turned, of: mesh.faces.len() });
+        }
+        let Components { of_face, count } = edges.components(mesh.faces.len());
+        let tree = BoxTree::build(&face_boxes(&mesh));
+        let mut closed = Self { mesh, components: of_face, component_count: count, edges, tree };
+        closed.turn_outward(&mut notices)?;
+        Ok((closed, notices))
+    }
+
+    /// The triangles, outward.
+    pub fn mesh(&self) -> &TriMesh {
+        &self.mesh
+    }
+
+    /// The faces on the other side of each of a face's edges: entry `i` across the edge from corner `i` to `i + 1`.
+    pub fn neighbours(&self, face: usize) -> [u32; 3] {
+        self.edges.neighbours(face)
+    }
+
+    /// The hierarchy of the faces' boxes.
+    pub fn tree(&self) -> &BoxTree {
+        &self.tree
+    }
+
+    /// How many pieces are not joined by an edge.
+    pub fn component_count(&self) -> usize {
+        self.component_count
+    }
+
+    /// One face of each component: the first in the mesh's order.
+    pub fn first_faces(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.component_count)
+            .filter_map(|c| self.components.iter().position(|&of_face| of_face as usize == c))
+    }
+
+    /// The number of handles of a surface of one component: 0 for a ball, 1 for a torus.
+    pub fn genus(&self) -> i64 {
+        let (v, f) = (self.mesh.vertices.len() as i64, self.mesh.faces.len() as i64);
+        let euler = v - f * 3 / 2 + f;
+        (2 * self.component_count as i64 - euler) / 2
+    }
+
+    /// The box around it, mm.
+    pub fn bounds(&self) -> Bounds {
+        self.tree.bounds()
+    }
+
+    /// The enclosed volume, mm³; positive.
+    pub fn volume_mm3(&self) -> f64 {
+        self.mesh.signed_volume()
+    }
+
+    /// On which side of the surface `point` lies. Exact.
+    pub fn side_of(&self, point: DVec3) -> Side {
+        side_of_surface(&self.mesh, &self.tree, point)
+    }
+
+    /// The distance from `point` to the surface, mm, in f64.
+    pub fn distance_mm(&self, point: DVec3) -> f64 {
+        let nearest = std::cell::Cell::new(f64::INFINITY);
+        self.tree.visit(
+            |b| (point.clamp(b.min, b.max) - point).length_squared() < nearest.get(),
+            |f| {
+                let d = super::predicates::squared_distance(point, self.mesh.triangle(f as usize));
+                nearest.set(nearest.get().min(d));
+            },
+        );
+        nearest.get().sqrt()
+    }
+
+    /// Makes solids look outward and cavities inward.
+    fn turn_outward(&mut self, notices: &mut Vec<Notice>) -> Result<(), MeshFault> {
+        let volumes = self.component_volumes();
+        let smallest = SMALLEST_FILL * self.bounds().size().max_element().powi(3);
+        if let Some(flat) = volumes.iter().position(|v| v.abs() <= smallest) {
+            return Err(MeshFault::Flat { component: flat + 1, of: self.component_count });
+        }
+        let depths: Vec<usize> = (0..self.component_count).map(|c| self.component_depth(c)).collect();
+        let is_wrong = |c: usize| (volumes[c] > 0.0) != (depths[c] % 2 == 0);
+        let wrong: Vec<usize> = (0..self.component_count).filter(|&c| is_wrong(c)).collect();
+        if wrong.is_empty() {
+            return Ok(());
+        }
+        let everything_is_inside_out = wrong.len() == self.component_count;
+        if !everything_is_inside_out && let Some(&inner) = wrong.iter().find(|&&c| depths[c] > 0) {
+            return Err(MeshFault::OverlappingComponents { component: inner + 1, of: self.component_count });
+        }
+        for face in 0..self.mesh.faces.len() {
+            if wrong.contains(&(self.components[face] as usize)) {
+                self.edges.turn(&mut self.mesh, face);
+            }
+        }
+        notices.push(Notice::TurnedInsideOut { components: wrong.len(), of: self.component_count });
+        Ok(())
+    }
+
+    fn component_volumes(&self) -> Vec<f64> {
+        let apex = self.bounds().centre();
+        let mut volumes = vec![0.0; self.component_count];
+        for (triangle, &component) in self.mesh.triangles().zip(&self.components) {
+            let [a, b, c] = triangle.map(|p| p - apex);
+            volumes[component as usize] += a.dot(b.cross(c)) / 6.0;
+        }
+        volumes
+    }
+
+    /// How many other components enclose this one.
+    fn component_depth(&self, component: usize) -> usize {
+        if self.component_count == 1 {
+            return 0;
+        }
+        let probe = self.components.iter().position(|&c| c as usize == component);
+        let Some(point) = probe.map(|f| self.mesh.triangle(f)[0]) else { return 0 };
+        (0..self.component_count)
+            .filter(|&other| other != component)
+            .filter(|&other| {
+                let of_other = |f: u32| self.components[f as usize] as usize == other;
+                winding_around(&self.mesh, &self.tree, point, of_other).is_some_and(|turns| turns != 0)
+            })
+            .count()
+    }
+}
+
+/// A component that fills less than this share of its cube encloses nothing but rounding: 2⁻⁵² of a cube, times the
+/// some hundred faces whose volumes cancel.
+const SMALLEST_FILL: f64 = 1e-13;
+
+fn check_numbers(mesh: &TriMesh) -> Result<(), MeshFault> {
+    if mesh.faces.is_empty() {
+        return Err(MeshFault::Empty);
+    }
+    if let Some(vertex) = mesh.vertices.iter().position(|v| !v.is_finite()) {
+        return Err(MeshFault::NotFinite { vertex: vertex + 1 });
+    }
+    if let Some(vertex) = mesh.vertices.iter().position(|v| v.abs().max_element() > LARGEST_COORDINATE_MM) {
+        return Err(MeshFault::TooFar { vertex: vertex + 1, limit_mm: LARGEST_COORDINATE_MM });
+    }
+    let count = mesh.vertices.len() as u32;
+    match mesh.faces.iter().position(|f| f.iter().any(|&v| v >= count)) {
+        Some(face) => Err(MeshFault::IndexOutOfRange { face: face + 1, vertices: mesh.vertices.len() }),
+        None => Ok(()),
+    }
+}
+
+/// Coordinates beyond a million kilometres leave the range in which the exact predicates were checked, and hold no
+/// patient.
+const LARGEST_COORDINATE_MM: f64 = 1e15;
+
+fn drop_unused_vertices(mesh: &mut TriMesh, notices: &mut Vec<Notice>) {
+    const UNUSED: u32 = u32::MAX;
+    let mut new_index = vec![UNUSED; mesh.vertices.len()];
+    let mut kept = Vec::with_capacity(mesh.vertices.len());
+    for vertex in mesh.faces.iter_mut().flatten() {
+        let index = &mut new_index[*vertex as usize];
+        if *index == UNUSED {
+            *index = kept.len() as u32;
+            kept.push(mesh.vertices[*vertex as usize]);
+        }
+        *vertex = *index;
+    }
+    if kept.len() < mesh.vertices.len() {
+        notices.push(Notice::UnusedVertices(mesh.vertices.len() - kept.len()));
+    }
+    mesh.vertices = kept;
+}
+
+fn face_boxes(mesh: &TriMesh) -> Vec<Bounds> {
+    mesh.triangles().map(Bounds::of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::primitives::{cube, icosphere};
+    use super::*;
+
+    #[test]
+    fn a_cube_is_closed_and_holds_its_volume() {
+        let (mesh, notices) = ClosedMesh::new(cube(2.0)).expect("closed");
+        assert!(notices.is_empty());
+        assert_eq!((mesh.volume_mm3(), mesh.component_count(), mesh.genus()), (8.0, 1, 0));
+        assert_eq!(mesh.side_of(DVec3::ZERO), Side::Inside);
+        assert_eq!(mesh.side_of(DVec3::new(1.0, 0.2, 0.1)), Side::On);
+        assert_eq!(mesh.distance_mm(DVec3::new(0.5, 0.0, 0.0)), 0.5);
+    }
+
+    #[test]
+    fn an_inside_out_cube_is_turned_with_a_notice() {
+        let mut inside_out = cube(2.0);
+        inside_out.faces.iter_mut().for_each(|f| f.swap(0, 1));
+        let (mesh, notices) = ClosedMesh::new(inside_out).expect("closed");
+        assert_eq!(mesh.volume_mm3(), 8.0);
+        assert_eq!(notices, [Notice::TurnedInsideOut { components: 1, of: 1 }]);
+    }
+
+    #[test]
+    fn a_single_turned_face_is_turned_back_with_a_notice() {
+        let mut one_wrong = cube(2.0);
+        one_wrong.faces[7].swap(0, 1);
+        let (mesh, notices) = ClosedMesh::new(one_wrong).expect("closed");
+        assert_eq!(mesh.volume_mm3(), 8.0);
+        assert_eq!(notices, [Notice::TurnedFaces { turned: 1, of: 12 }]);
+    }
+
+    #[test]
+    fn a_missing_face_is_an_open_edge() {
+        let mut open = cube(2.0);
+        open.faces.pop();
+        assert!(matches!(ClosedMesh::new(open), Err(MeshFault::Open { edges: 3, .. })));
+    }
+
+    #[test]
+    fn a_face_given_twice_is_not_manifold() {
+        let mut doubled = cube(2.0);
+        doubled.faces.push(doubled.faces[0]);
+        assert!(matches!(ClosedMesh::new(doubled), Err(MeshFault::NotManifold { faces: 3, .. })));
+    }
+
+    #[test]
+    fn a_cavity_looks_inward_and_its_volume_is_taken_off() {
+        let mut shell = cube(4.0);
+        let mut hole = cube(2.0);
+        hole.faces.iter_mut().for_each(|f| f.swap(0, 1));
+        shell.append(&hole);
+        let (mesh, notices) = ClosedMesh::new(shell.clone()).expect("closed");
+        assert_eq!(notices, []);
+        assert!((mesh.volume_mm3() - 56.0).abs() < 1e-12);
+        assert_eq!(mesh.side_of(DVec3::ZERO), Side::Outside);
+
+        shell.faces.iter_mut().for_each(|f| f.swap(0, 1));
+        let (mesh, notices) = ClosedMesh::new(shell).expect("closed");
+        assert!((mesh.volume_mm3() - 56.0).abs() < 1e-12);
+        assert_eq!(notices, [Notice::TurnedInsideOut { components: 2, of: 2 }]);
+    }
+
+    #[test]
+    fn a_solid_inside_a_solid_of_one_mesh_is_refused() {
+        let mut nested = cube(4.0);
+        nested.append(&cube(2.0));
+        assert!(matches!(ClosedMesh::new(nested), Err(MeshFault::OverlappingComponents { .. })));
+    }
+
+    #[test]
+    fn nan_bad_index_and_flat_meshes_are_refused() {
+        let mut nan = cube(2.0);
+        nan.vertices[3].y = f64::NAN;
+        assert_eq!(ClosedMesh::new(nan).err(), Some(MeshFault::NotFinite { vertex: 4 }));
+        let mut bad = cube(2.0);
+        bad.faces[2][1] = 99;
+        assert_eq!(ClosedMesh::new(bad).err(), Some(MeshFault::IndexOutOfRange { face: 3, vertices: 8 }));
+        let flat = icosphere(1).map_vertices(|v| DVec3::new(v.x, v.y, 0.0));
+        assert!(matches!(ClosedMesh::new(flat), Err(MeshFault::Flat { .. })));
+        assert_eq!(ClosedMesh::new(TriMesh::default()).err(), Some(MeshFault::Empty));
+    }
+}

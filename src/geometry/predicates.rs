@@ -1,0 +1,161 @@
+//! Exact signs (Shewchuk 1997, doi:10.1007/PL00009321) and what follows from them.
+
+use glam::DVec3;
+use robust::{Coord, Coord3D};
+
+/// On which side of the plane through `a`, `b`, `c` the point `p` lies: `Greater` on the side its counter-clockwise
+/// normal points to, `Equal` exactly in the plane. Exact, not rounded.
+pub fn side_of_plane([a, b, c]: [DVec3; 3], p: DVec3) -> std::cmp::Ordering {
+    let coord = |v: DVec3| Coord3D { x: v.x, y: v.y, z: v.z };
+    // Shewchuk's sign is positive below the plane. It is exact as long as products of three coordinate differences
+    // neither overflow nor underflow: for anything between 1e-80 and 1e+80 mm.
+    let below = robust::orient3d(coord(a), coord(b), coord(c), coord(p));
+    0.0.partial_cmp(&below).unwrap_or(std::cmp::Ordering::Equal)
+}
+
+/// Whether the plane point `p`, moved by an infinitesimal (ε, ε²), lies in the triangle, and if so how it is wound:
+/// +1 counter-clockwise, −1 clockwise, 0 outside (or the triangle has no area).
+///
+/// The infinitesimal move (simulation of simplicity, Edelsbrunner & Mücke 1990, doi:10.1145/77635.77639) gives every
+/// point to exactly one of the triangles that share an edge or a vertex, by exact signs: nothing is counted twice or
+/// lost.
+pub fn cover([a, b, c]: [[f64; 2]; 3], p: [f64; 2]) -> i32 {
+    let sign = |u: [f64; 2], v: [f64; 2]| {
+        let coord = |q: [f64; 2]| Coord { x: q[0], y: q[1] };
+        let area = robust::orient2d(coord(u), coord(v), coord(p));
+        if area != 0.0 {
+            return if area > 0.0 { 1 } else { -1 };
+        }
+        // d/dε of the area under p + (ε, ε²): first −(v.y − u.y), then v.x − u.x.
+        match (u[1].partial_cmp(&v[1]), v[0].partial_cmp(&u[0])) {
+            (Some(std::cmp::Ordering::Greater), _) => 1,
+            (Some(std::cmp::Ordering::Less), _) => -1,
+            (_, Some(std::cmp::Ordering::Greater)) => 1,
+            (_, Some(std::cmp::Ordering::Less)) => -1,
+            _ => 0,
+        }
+    };
+    let (first, second, third) = (sign(a, b), sign(b, c), sign(c, a));
+    if first == second && second == third { first } else { 0 }
+}
+
+/// How two triangles meet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Meeting {
+    /// They share no point, or share one only where an exact sign is zero and no interiors can meet.
+    Apart,
+    /// Some sign was exactly zero: they may touch, be coplanar or share corners.
+    Degenerate,
+    /// An edge of one passes through the inside of the other.
+    Cross {
+        /// Whether the edge is the first triangle's.
+        edge_of_first: bool,
+        /// Which edge: from this corner to the next.
+        edge: usize,
+        /// About where, in f64: a place to show, not to compute with.
+        place: DVec3,
+    },
+}
+
+/// How the triangles `s` and `t` meet, by exact signs.
+pub fn meeting(s: [DVec3; 3], t: [DVec3; 3]) -> Meeting {
+    use std::cmp::Ordering::{Equal, Greater, Less};
+    let s_sides = s.map(|p| side_of_plane(t, p));
+    let t_sides = t.map(|p| side_of_plane(s, p));
+    let all = |sides: [std::cmp::Ordering; 3], side| sides.iter().all(|&x| x == side);
+    if [s_sides, t_sides].iter().any(|&sides| all(sides, Greater) || all(sides, Less)) {
+        return Meeting::Apart;
+    }
+    let mut degenerate = s_sides.contains(&Equal) || t_sides.contains(&Equal);
+    for (edge_of_first, edges, sides, face) in [(true, s, s_sides, t), (false, t, t_sides, s)] {
+        for i in 0..3 {
+            let j = (i + 1) % 3;
+            if sides[i] == sides[j] || sides[i] == Equal || sides[j] == Equal {
+                continue;
+            }
+            let around = [0, 1, 2].map(|k| side_of_plane([edges[i], edges[j], face[k]], face[(k + 1) % 3]));
+            if around.contains(&Equal) {
+                degenerate = true;
+            } else if all(around, around[0]) {
+                let place = crossing_place(edges[i], edges[j], face);
+                return Meeting::Cross { edge_of_first, edge: i, place };
+            }
+        }
+    }
+    if degenerate { Meeting::Degenerate } else { Meeting::Apart }
+}
+
+fn crossing_place(p: DVec3, q: DVec3, [a, b, c]: [DVec3; 3]) -> DVec3 {
+    let n = (b - a).cross(c - a);
+    let (dp, dq) = (n.dot(p - a), n.dot(q - a));
+    if dp == dq { p.midpoint(q) } else { p.lerp(q, (dp / (dp - dq)).clamp(0.0, 1.0)) }
+}
+
+/// The squared distance from `p` to the triangle, mm², in f64 (Ericson, *Real-Time Collision Detection*, §5.1.5).
+pub fn squared_distance(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let n = ab.cross(ac);
+    let nn = n.length_squared();
+    if nn > 0.0 {
+        let v = ap.cross(ac).dot(n) / nn;
+        let w = ab.cross(ap).dot(n) / nn;
+        if v >= 0.0 && w >= 0.0 && v + w <= 1.0 {
+            return ap.dot(n).powi(2) / nn;
+        }
+    }
+    let to_edge = |u: DVec3, v: DVec3| {
+        let d = v - u;
+        let length = d.length_squared();
+        let t = if length > 0.0 { ((p - u).dot(d) / length).clamp(0.0, 1.0) } else { 0.0 };
+        (u + t * d - p).length_squared()
+    };
+    to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cmp::Ordering;
+
+    use super::*;
+
+    const FLOOR: [DVec3; 3] = [DVec3::ZERO, DVec3::X, DVec3::Y];
+
+    #[test]
+    fn the_normal_points_to_the_greater_side() {
+        assert_eq!(side_of_plane(FLOOR, DVec3::Z), Ordering::Greater);
+        assert_eq!(side_of_plane(FLOOR, -DVec3::Z * 1e-60), Ordering::Less);
+        assert_eq!(side_of_plane(FLOOR, DVec3::new(7.0, -3.0, 0.0)), Ordering::Equal);
+    }
+
+    #[test]
+    fn a_shared_edge_and_a_shared_vertex_are_covered_once() {
+        // A square in four triangles around its centre.
+        let (o, corners) = ([0.0, 0.0], [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]]);
+        let count =
+            |p: [f64; 2]| (0..4).map(|i| cover([o, corners[i], corners[(i + 1) % 4]], p)).sum::<i32>();
+        for p in [o, [0.5, 0.5], [-0.5, 0.5], [0.25, -0.25], [-0.5, -0.5]] {
+            assert_eq!(count(p), 1, "{p:?}");
+        }
+        // On the outline, half of the edges belong to the square.
+        assert_eq!(count([-1.0, 0.0]) + count([1.0, 0.0]), 1);
+        assert_eq!(count([2.0, 0.0]), 0);
+    }
+
+    #[test]
+    fn triangles_cross_touch_or_stay_apart() {
+        let wall =
+            |x: f64, z: f64| [DVec3::new(x, 0.2, z), DVec3::new(x, 0.3, z), DVec3::new(x, 0.2, z + 1.0)];
+        assert!(matches!(meeting(FLOOR, wall(0.3, -0.5)), Meeting::Cross { .. }));
+        assert_eq!(meeting(FLOOR, wall(0.3, 0.5)), Meeting::Apart);
+        assert_eq!(meeting(FLOOR, wall(0.3, 0.0)), Meeting::Degenerate);
+        assert_eq!(meeting(FLOOR, wall(2.0, -0.5)), Meeting::Apart);
+    }
+
+    #[test]
+    fn distance_is_to_the_nearest_part() {
+        let d = |x, y, z| squared_distance(DVec3::new(x, y, z), FLOOR);
+        assert_eq!(d(0.2, 0.2, 2.0), 4.0);
+        assert_eq!(d(-3.0, 0.0, 4.0), 25.0);
+        assert_eq!(d(0.5, -2.0, 0.0), 4.0);
+    }
+}

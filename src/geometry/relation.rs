@@ -1,0 +1,263 @@
+//! How two closed surfaces lie to each other, and whether one crosses itself.
+//!
+//! Whether faces meet is decided by exact signs. Where they do, probes (vertices, face centres, the middles of edge
+//! pieces between crossings, a point inside each component) tell contact from crossing: bodies whose flat faces
+//! lie on each other touch, bodies that share a volume deeper than rounding explains cross.
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+
+use glam::DVec3;
+
+use super::predicates::{Meeting, meeting};
+use super::{Bounds, ClosedMesh, Side, rounding_tolerance_mm};
+
+/// How the body `a` lies to the body `b`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Relation {
+    /// They share no volume; their surfaces may touch.
+    Disjoint,
+    /// All of `a` lies in `b`; their surfaces may touch.
+    Inside,
+    /// All of `b` lies in `a`; their surfaces may touch.
+    Around,
+    /// They share some volume, and each has some of its own (or both have none).
+    Crossing {
+        /// A place of both, about the deepest found.
+        place: DVec3,
+        /// How deep it lies under the surface of the other body, mm.
+        depth_mm: f64,
+    },
+}
+
+/// The pairs of faces after which more crossings tell nothing new.
+const ENOUGH_CROSSINGS: usize = 10_000;
+
+/// How `a` lies to `b`. Contact within the rounding of the vertices counts as touching.
+pub fn relation(a: &ClosedMesh, b: &ClosedMesh) -> Relation {
+    if !a.bounds().touches(&b.bounds()) {
+        return Relation::Disjoint;
+    }
+    let contact = surface_contact(a, b);
+    let depth_a = Depths::measure(&probes(a, contact.surfaces_meet, &contact.on_edges_of_a), b);
+    let depth_b = Depths::measure(&probes(b, contact.surfaces_meet, &contact.on_edges_of_b), a);
+    let tolerance =
+        rounding_tolerance_mm(a.mesh().vertices.iter()) + rounding_tolerance_mm(b.mesh().vertices.iter());
+
+    let nothing_shared = depth_a.inside.0 <= tolerance && depth_b.inside.0 <= tolerance;
+    let (a_within, b_within) = (depth_a.outside <= tolerance, depth_b.outside <= tolerance);
+    match (nothing_shared, a_within, b_within) {
+        (true, ..) => Relation::Disjoint,
+        (false, true, false) => Relation::Inside,
+        (false, false, true) => Relation::Around,
+        _ => {
+            let (depth_mm, place) =
+                if depth_a.inside.0 >= depth_b.inside.0 { depth_a.inside } else { depth_b.inside };
+            Relation::Crossing { place, depth_mm }
+        }
+    }
+}
+
+/// The pairs of faces of one surface that pass through each other: how many, and a place. `None` if it does not
+/// cross itself.
+pub fn self_crossing(surface: &ClosedMesh) -> Option<(usize, DVec3)> {
+    let mut crossings = 0;
+    let mut first = None;
+    let mesh = surface.mesh();
+    let _ = surface.tree().overlapping_pairs(surface.tree(), |f, g| {
+        if f < g {
+            let (s, t) = (mesh.triangle(f as usize), mesh.triangle(g as usize));
+            if Bounds::of(s).touches(&Bounds::of(t))
+                && let Meeting::Cross { place, .. } = meeting(s, t)
+            {
+                crossings += 1;
+                first.get_or_insert(place);
+            }
+        }
+        if crossings < ENOUGH_CROSSINGS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    });
+    first.map(|place| (crossings, place))
+}
+
+#[derive(Default)]
+struct Contact {
+    surfaces_meet: bool,
+    on_edges_of_a: EdgeCrossings,
+    on_edges_of_b: EdgeCrossings,
+}
+
+/// The places at which an edge, given by its vertices, passes through the other surface.
+type EdgeCrossings = BTreeMap<[u32; 2], Vec<DVec3>>;
+
+fn surface_contact(a: &ClosedMesh, b: &ClosedMesh) -> Contact {
+    let mut contact = Contact::default();
+    let mut crossings = 0;
+    let _ = a.tree().overlapping_pairs(b.tree(), |f, g| {
+        let (s, t) = (a.mesh().triangle(f as usize), b.mesh().triangle(g as usize));
+        if !Bounds::of(s).touches(&Bounds::of(t)) {
+            return ControlFlow::Continue(());
+        }
+        match meeting(s, t) {
+            Meeting::Apart => {}
+            Meeting::Degenerate => contact.surfaces_meet = true,
+            Meeting::Cross { edge_of_first, edge, place } => {
+                contact.surfaces_meet = true;
+                crossings += 1;
+                let (list, corners) = match edge_of_first {
+                    true => (&mut contact.on_edges_of_a, a.mesh().faces[f as usize]),
+                    false => (&mut contact.on_edges_of_b, b.mesh().faces[g as usize]),
+                };
+                let (u, v) = (corners[edge], corners[(edge + 1) % 3]);
+                list.entry([u.min(v), u.max(v)]).or_default().push(place);
+            }
+        }
+        if crossings < ENOUGH_CROSSINGS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    });
+    contact
+}
+
+/// Points of a body to be held against another: a few if the surfaces do not meet, many if they do.
+fn probes(body: &ClosedMesh, surfaces_meet: bool, crossings: &EdgeCrossings) -> Vec<DVec3> {
+    let mesh = body.mesh();
+    let mut points = one_vertex_per_component(body);
+    if !surfaces_meet {
+        return points;
+    }
+    points.extend(points_inside(body));
+    points.extend(&mesh.vertices);
+    points.extend(mesh.triangles().map(|[a, b, c]| (a + b + c) / 3.0));
+    for (&[u, v], places) in crossings {
+        let (start, end) = (mesh.vertices[u as usize], mesh.vertices[v as usize]);
+        let mut stops = places.clone();
+        stops.sort_by(|p, q| (p - start).length_squared().total_cmp(&(q - start).length_squared()));
+        stops.insert(0, start);
+        stops.push(end);
+        points.extend(stops.windows(2).map(|w| w[0].midpoint(w[1])));
+    }
+    points
+}
+
+fn one_vertex_per_component(body: &ClosedMesh) -> Vec<DVec3> {
+    body.first_faces().map(|f| body.mesh().triangle(f)[0]).collect()
+}
+
+/// A point well inside each solid component: half way from its largest face to where the inward normal leaves.
+fn points_inside(body: &ClosedMesh) -> Vec<DVec3> {
+    let mesh = body.mesh();
+    body.first_faces()
+        .filter_map(|f| {
+            let [a, b, c] = mesh.triangle(f);
+            let inward = -(b - a).cross(c - a).normalize_or_zero();
+            let centre = (a + b + c) / 3.0;
+            // Halving from the body's size always ends inside or at the face itself.
+            let reach = body.bounds().diagonal();
+            (0..40)
+                .map(|k| centre + inward * reach * 0.5f64.powi(k))
+                .find(|&p| body.side_of(p) == Side::Inside)
+        })
+        .collect()
+}
+
+/// How deep probes lie in a body, and how far out of it, mm.
+struct Depths {
+    inside: (f64, DVec3),
+    outside: f64,
+}
+
+impl Depths {
+    fn measure(points: &[DVec3], body: &ClosedMesh) -> Self {
+        let mut depths = Self { inside: (0.0, DVec3::ZERO), outside: 0.0 };
+        for &p in points {
+            match body.side_of(p) {
+                Side::On => {}
+                Side::Inside => {
+                    let d = body.distance_mm(p);
+                    if d >= depths.inside.0 {
+                        depths.inside = (d, p);
+                    }
+                }
+                Side::Outside => depths.outside = depths.outside.max(body.distance_mm(p)),
+            }
+        }
+        depths
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::TriMesh;
+    use super::super::primitives::{cube, icosphere};
+    use super::*;
+
+    fn closed(mesh: TriMesh) -> ClosedMesh {
+        ClosedMesh::new(mesh).expect("closed").0
+    }
+
+    fn cube_at(side: f64, x: f64, y: f64, z: f64) -> ClosedMesh {
+        closed(cube(side).map_vertices(|v| v + DVec3::new(x, y, z)))
+    }
+
+    fn is_crossing(r: Relation) -> bool {
+        matches!(r, Relation::Crossing { .. })
+    }
+
+    #[test]
+    fn cubes_apart_nested_and_crossing_are_told_apart() {
+        let big = cube_at(4.0, 0.0, 0.0, 0.0);
+        assert_eq!(relation(&big, &cube_at(2.0, 9.0, 0.0, 0.0)), Relation::Disjoint);
+        assert_eq!(relation(&big, &cube_at(2.0, 0.1, 0.2, 0.3)), Relation::Around);
+        assert_eq!(relation(&cube_at(2.0, 0.1, 0.2, 0.3), &big), Relation::Inside);
+        let Relation::Crossing { depth_mm, place } = relation(&big, &cube_at(2.0, 2.5, 0.1, 0.2)) else {
+            panic!("a crossing was missed")
+        };
+        assert!((0.4..=0.5).contains(&depth_mm), "{depth_mm} at {place}");
+    }
+
+    #[test]
+    fn boxes_stacked_face_to_face_touch() {
+        let a = cube_at(2.0, 0.0, 0.0, 0.0);
+        assert_eq!(relation(&a, &cube_at(2.0, 0.0, 0.0, 2.0)), Relation::Disjoint);
+        assert_eq!(relation(&a, &cube_at(1.0, 0.3, 0.2, 1.5)), Relation::Disjoint);
+        assert_eq!(relation(&a, &cube_at(1.0, 0.3, 0.2, 0.5)), Relation::Around);
+    }
+
+    #[test]
+    fn boxes_with_all_faces_flush_that_overlap_cross() {
+        // No edge passes strictly through a face: only probes can tell.
+        let (a, b) = (cube_at(2.0, 0.0, 0.0, 0.0), cube_at(2.0, 1.0, 0.0, 0.0));
+        assert!(is_crossing(relation(&a, &b)));
+        assert!(is_crossing(relation(&a, &a)), "equal bodies occupy the same space");
+    }
+
+    #[test]
+    fn crossed_rods_without_a_vertex_in_each_other_cross() {
+        let rod = |sx: f64, sy: f64| closed(cube(1.0).map_vertices(|v| v * DVec3::new(sx, sy, 0.9)));
+        assert!(is_crossing(relation(&rod(10.0, 1.0), &rod(1.0, 10.1))));
+    }
+
+    #[test]
+    fn a_body_half_inside_another_by_components_crosses() {
+        let mut pair = cube(1.0);
+        pair.append(&cube(1.0).map_vertices(|v| v + 20.0));
+        assert!(is_crossing(relation(&closed(pair), &cube_at(4.0, 0.0, 0.0, 0.0))));
+    }
+
+    #[test]
+    fn a_ball_in_a_cavity_is_disjoint_from_the_shell() {
+        let mut shell = icosphere(2).map_vertices(|v| 10.0 * v);
+        let mut hole = icosphere(2).map_vertices(|v| 8.0 * v);
+        hole.faces.iter_mut().for_each(|f| f.swap(0, 1));
+        shell.append(&hole);
+        let ball = closed(icosphere(2).map_vertices(|v| 5.0 * v));
+        assert_eq!(relation(&closed(shell), &ball), Relation::Disjoint);
+    }
+
+    #[test]
+    fn a_surface_drawn_through_itself_is_found() {
+        let mut twisted = icosphere(2).map_vertices(|v| 10.0 * v);
+        assert_eq!(self_crossing(&closed(twisted.clone())), None);
+        twisted.vertices[20] *= -2.0;
+        let (pairs, _) = self_crossing(&closed(twisted)).expect("a crossing");
+        assert!(pairs > 1);
+    }
+}
