@@ -30,7 +30,10 @@ impl Body {
     pub fn new(surface: ClosedMesh) -> Self {
         let form = match ConvexMesh::new(surface) {
             Ok(mesh) => Form::Convex { clipper: ConvexClipper::new(&mesh), mesh },
-            Err((surface, why)) => Form::General { surface, why },
+            Err(refused) => {
+                let (surface, why) = *refused;
+                Form::General { surface, why }
+            }
         };
         Self { form }
     }

@@ -127,7 +127,7 @@ impl ClosedMesh {
             return Err(MeshFault::Flat { component: flat + 1, of: self.component_count });
         }
         let depths: Vec<usize> = (0..self.component_count).map(|c| self.component_depth(c)).collect();
-        let is_wrong = |c: usize| (volumes[c] > 0.0) != (depths[c] % 2 == 0);
+        let is_wrong = |c: usize| (volumes[c] > 0.0) != (depths[c].is_multiple_of(2));
         let wrong: Vec<usize> = (0..self.component_count).filter(|&c| is_wrong(c)).collect();
         if wrong.is_empty() {
             return Ok(());

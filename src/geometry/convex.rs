@@ -65,14 +65,14 @@ impl ConvexMesh {
     /// Proves that `surface` is convex within the rounding of its vertices, or hands it back with the reason.
     ///
     /// Every vertex is held against every face's plane (a branch-and-bound search, about n log n).
-    pub fn new(surface: ClosedMesh) -> Result<Self, (ClosedMesh, NotConvex)> {
+    pub fn new(surface: ClosedMesh) -> Result<Self, Box<(ClosedMesh, NotConvex)>> {
         if surface.component_count() > 1 {
             let count = surface.component_count();
-            return Err((surface, NotConvex::Components(count)));
+            return Err(Box::new((surface, NotConvex::Components(count))));
         }
         if surface.genus() != 0 {
             let handles = surface.genus();
-            return Err((surface, NotConvex::Handles(handles)));
+            return Err(Box::new((surface, NotConvex::Handles(handles))));
         }
         // A face without area bounds nothing: its plane is left out, and its neighbours close the body.
         let planes: Vec<Plane> = surface
@@ -86,7 +86,7 @@ impl ConvexMesh {
             if depth > worst.0 { (depth, vertex) } else { worst }
         });
         if depth_mm > tolerance_mm {
-            return Err((surface, NotConvex::Reflex { depth_mm, tolerance_mm, place }));
+            return Err(Box::new((surface, NotConvex::Reflex { depth_mm, tolerance_mm, place })));
         }
         Ok(Self { surface, planes, reflex_depth_mm: depth_mm })
     }
@@ -175,7 +175,7 @@ mod tests {
     use super::*;
 
     fn convex(mesh: super::super::TriMesh) -> Result<ConvexMesh, NotConvex> {
-        ConvexMesh::new(ClosedMesh::new(mesh).expect("closed").0).map_err(|(_, why)| why)
+        ConvexMesh::new(ClosedMesh::new(mesh).expect("closed").0).map_err(|refused| refused.1)
     }
 
     #[test]
