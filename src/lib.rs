@@ -2,5 +2,7 @@
 
 pub mod error;
 pub mod geometry;
+pub mod physics;
+pub mod scene;
 
 pub use error::{Error, Result};
