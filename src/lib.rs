@@ -3,5 +3,7 @@
 pub mod error;
 pub mod exact;
 pub mod geometry;
+pub mod physics;
+pub mod scene;
 
 pub use error::{Error, Result};
