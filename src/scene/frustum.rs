@@ -18,7 +18,7 @@ use crate::geometry::Bounds;
 
 /// Rounding units by which planes are moved out, per millimetre of coordinate. A pixel centre takes 4 roundings per coordinate, a
 /// point of a segment 6 more, a normal (difference, cross product, normalization) 9, its product with a difference 6: under
-/// 32 in all. Eight times that is still under a micrometre at ten kilometres, and skips no fewer boxes.
+/// 32 in all. Eight times that is still under a micrometre at ten kilometres, too little to keep a box that matters.
 const ROUNDING: f64 = 256.0 * f64::EPSILON;
 
 /// A convex region that holds every segment of a tile of pixels. Patient LPS, mm.
