@@ -140,8 +140,7 @@ impl Attenuator {
         if self.bins.len() == 1 {
             return exponent(0);
         }
-        // `f64::min` would pass over a NaN, which must come out as one.
-        let least = (0..self.bins.len()).map(exponent).fold(f64::INFINITY, |a, b| if b >= a { a } else { b });
+        let least = (0..self.bins.len()).map(exponent).fold(f64::INFINITY, f64::min);
         let signals = || self.bins.iter().enumerate().map(|(k, bin)| (bin.signal, least - exponent(k)));
         let left: f64 = signals().map(|(signal, deeper)| signal * deeper.exp()).sum();
         if left > THIN {

@@ -18,8 +18,8 @@ use crate::geometry::Bounds;
 
 /// Rounding units by which planes are moved out, per millimetre of coordinate. A pixel centre takes 4 roundings per coordinate, a
 /// point of a segment 6 more, a normal (difference, cross product, normalization) 9, its product with a difference 6: under
-/// 32 in all, doubled.
-const ROUNDING: f64 = 64.0 * f64::EPSILON;
+/// 32 in all. Eight times that is still under a micrometre at ten kilometres, too little to keep a box that matters.
+const ROUNDING: f64 = 256.0 * f64::EPSILON;
 
 /// A convex region that holds every segment of a tile of pixels. Patient LPS, mm.
 #[derive(Clone, Debug)]
@@ -87,9 +87,12 @@ impl HalfSpace {
 mod tests {
     use glam::DVec3;
     use proptest::prelude::*;
+    use proptest::test_runner::RngSeed;
 
     use crate::geometry::{Bounds, UnitDir};
     use crate::scene::{Panel, Pose, View};
+
+    const SEED: u64 = 61_217;
 
     fn vector(reach: f64) -> impl Strategy<Value = DVec3> {
         [-reach..reach, -reach..reach, -reach..reach].prop_map(DVec3::from)
@@ -98,14 +101,25 @@ mod tests {
     /// Any view that a constructor accepts: oblique, far from the origin, grazing, mirrored, cone or parallel.
     fn any_view() -> impl Strategy<Value = View> {
         let offset = prop_oneof![Just(0.0), Just(1e3), Just(1e6)];
-        let poses = (vector(1.0), vector(1.0), vector(1.0), vector(1.0), offset, 1e-3..2000.0, any::<bool>());
+        let steepness = prop_oneof![Just(1.0), Just(1e-3), Just(1e-6)];
+        // Grazing rays that also run along the pixel rows have the least certain side planes.
+        let along_rows = prop_oneof![Just(0.0), Just(1.0)];
+        let away = (vector(1.0), steepness, along_rows);
+        let poses = (vector(1.0), vector(1.0), away, vector(1.0), offset, 1e-3..2000.0, any::<bool>());
         let views = (poses, 1u32..200, 1u32..200).prop_map(
-            |((column, other, away, shift, offset, distance, parallel), columns, rows)| {
+            |(
+                (column, other, (away, steepness, along_rows), shift, offset, distance, parallel),
+                columns,
+                rows,
+            )| {
                 let column_step_mm = column.try_normalize()?;
                 let row_step_mm =
                     0.7 * (other - other.dot(column_step_mm) * column_step_mm).try_normalize()?;
                 let centre = offset * shift;
-                let downstream = UnitDir::new(away)?;
+                let normal = column_step_mm.cross(row_step_mm);
+                let away = away.lerp(row_step_mm, along_rows * (1.0 - steepness));
+                let out_of_plane = away.dot(normal) / normal.length_squared() * normal;
+                let downstream = UnitDir::new(away - (1.0 - steepness) * out_of_plane)?;
                 let source = centre - distance * downstream.get();
                 let panel = Panel::centred(centre, column_step_mm, row_step_mm, [columns, rows]);
                 match parallel {
@@ -118,7 +132,12 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(4000))]
+        #![proptest_config(ProptestConfig {
+            cases: 20_000,
+            rng_seed: RngSeed::Fixed(SEED),
+            failure_persistence: None,
+            ..Default::default()
+        })]
 
         #[test]
         fn a_box_that_holds_a_point_of_a_ray_is_never_missed(
