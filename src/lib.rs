@@ -2,5 +2,7 @@
 
 pub mod error;
 pub mod geometry;
+pub mod output;
+pub mod scene;
 
 pub use error::{Error, Result};
