@@ -98,7 +98,8 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("oblique.mha");
         let column_axis = DVec3::new(2.0, 3.0, 6.0) / 7.0;
-        let row_axis = DVec3::new(3.0, -6.0, 2.0) / 7.0;
+        // With these axes the matrix is not symmetric: rows in place of columns would be noticed.
+        let row_axis = DVec3::new(6.0, 2.0, -3.0) / 7.0;
         let origin = DVec3::new(0.1, -1e-7, 1133.59);
         let geometry =
             Geometry::new(origin, column_axis, row_axis, [0.388, 1.0 / 3.0, 1.0]).expect("a geometry");

@@ -5,20 +5,13 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::{MeshFile, ReadOptions, weld};
+use super::{MeshFile, ReadOptions, polygon, weld};
 use crate::geometry::TriMesh;
 use crate::{Error, Result};
 
 /// Coordinates beyond this, in any unit, are refused: no body is that large, and up to here (also scaled by a
 /// thousand, to 10¹⁸) volumes and products of two face normals stay below 10⁷⁴, far from overflow.
 const LARGEST_COORDINATE: f64 = 1e15;
-
-/// A triangle of a fan that covers less than this share of its polygon's area counts as turned over or flat.
-/// Only the choice of the fan's apex and a notice depend on it; decimals rounded at nine digits stay below it.
-const FLAT_SHARE: f64 = 1e-9;
-
-/// Corners up to which every corner is tried as a fan's apex: the trial takes the square of their number.
-const MOST_CORNERS_TRIED: usize = 64;
 
 /// Names listed in an error, at most.
 const MOST_NAMES_LISTED: usize = 24;
@@ -31,7 +24,7 @@ pub(super) struct Draft<'a> {
     faces: Vec<[u32; 3]>,
     sections: Vec<Section>,
     polygons: usize,
-    first_folded: Option<String>,
+    first_overlap: Option<String>,
     notices: Vec<String>,
     shares_vertices: bool,
 }
@@ -51,7 +44,7 @@ impl<'a> Draft<'a> {
             faces: Vec::new(),
             sections: Vec::new(),
             polygons: 0,
-            first_folded: None,
+            first_overlap: None,
             notices: Vec::new(),
             shares_vertices: true,
         }
@@ -114,8 +107,8 @@ impl<'a> Draft<'a> {
         Ok(())
     }
 
-    /// Adds a polygon over known vertices as a fan of triangles. An error if it has fewer than three corners
-    /// or the file too many triangles.
+    /// Adds a polygon over known vertices, as triangles. An error if it has fewer than three corners or the
+    /// file too many triangles.
     pub fn add_polygon(&mut self, corners: &[u32], place: impl Display) -> Result<()> {
         if corners.len() < 3 {
             return Err(self.refuse_at(
@@ -125,9 +118,17 @@ impl<'a> Draft<'a> {
             ));
         }
         self.expect_faces(corners.len() - 2)?;
-        let apex = self.fan_apex(corners, place);
-        let corner = |i: usize| corners[(apex + i) % corners.len()];
-        self.faces.extend((1..corners.len() - 1).map(|i| [corner(0), corner(i), corner(i + 1)]));
+        if let &[a, b, c] = corners {
+            self.faces.push([a, b, c]);
+            return Ok(());
+        }
+        let points: Vec<DVec3> = corners.iter().map(|&v| self.vertices[v as usize]).collect();
+        let split = polygon::split(&points);
+        self.faces.extend(split.triangles.iter().map(|triangle| triangle.map(|i| corners[i])));
+        self.polygons += 1;
+        if split.overlaps && self.first_overlap.is_none() {
+            self.first_overlap = Some(place.to_string());
+        }
         Ok(())
     }
 
@@ -140,29 +141,6 @@ impl<'a> Draft<'a> {
             format!("the mesh has more than the limit of {} triangles", self.max_faces),
             "reduce the mesh to what the study needs, or raise the limit",
         ))
-    }
-
-    /// The corner from which a polygon is split: the first, unless its triangles would overlap or be flat and
-    /// another corner's would do better. A polygon that no corner can split well is remembered for a notice.
-    fn fan_apex(&mut self, corners: &[u32], place: impl Display) -> usize {
-        if corners.len() == 3 {
-            return 0;
-        }
-        self.polygons += 1;
-        let points: Vec<DVec3> = corners.iter().map(|&v| self.vertices[v as usize]).collect();
-        let mut best = (0, smallest_share(&points, 0));
-        if best.1 <= FLAT_SHARE && points.len() <= MOST_CORNERS_TRIED {
-            for apex in 1..points.len() {
-                let share = smallest_share(&points, apex);
-                if share > best.1 {
-                    best = (apex, share);
-                }
-            }
-        }
-        if best.1 < -FLAT_SHARE && self.first_folded.is_none() {
-            self.first_folded = Some(place.to_string());
-        }
-        best.0
     }
 
     /// The chosen faces, welded. An error if a chosen name is not there or no face is left.
@@ -192,9 +170,9 @@ impl<'a> Draft<'a> {
                 counted(self.polygons, "polygon was", "polygons were")
             ));
         }
-        if let Some(place) = self.first_folded {
+        if let Some(place) = self.first_overlap {
             notices.push(format!(
-                "the polygon at {place} is bent so that its triangles overlap: split it where it was modelled"
+                "the polygon at {place} could not be split without overlap: split it where it was modelled"
             ));
         }
         if welded.joined > 0 && self.shares_vertices {
@@ -249,20 +227,6 @@ impl<'a> Draft<'a> {
         self.faces = kept;
         Ok(())
     }
-}
-
-/// The smallest share of a polygon's area that a triangle of the fan from `apex` covers; negative if the
-/// triangle is turned over. The area vector is Newell's sum of corner products (Sutherland et al. 1974), taken
-/// from a corner so that a polygon far from the origin loses no digits. 0 if the polygon has no area.
-fn smallest_share(points: &[DVec3], apex: usize) -> f64 {
-    let from_apex = |i: usize| points[(apex + i) % points.len()] - points[apex];
-    let triangles = || (1..points.len() - 1).map(|i| from_apex(i).cross(from_apex(i + 1)));
-    let area: DVec3 = triangles().sum();
-    let squared = area.length_squared();
-    if squared == 0.0 {
-        return 0.0;
-    }
-    triangles().map(|triangle| triangle.dot(area) / squared).fold(f64::INFINITY, f64::min)
 }
 
 /// `1 face was`, `2 faces were`.

@@ -14,6 +14,7 @@
 mod draft;
 mod obj;
 mod ply;
+mod polygon;
 mod stl;
 #[cfg(test)]
 mod tests;
