@@ -3,6 +3,7 @@
 pub mod error;
 pub mod exact;
 pub mod geometry;
+pub mod output;
 pub mod physics;
 pub mod scene;
 

@@ -6,6 +6,7 @@ pub mod iec;
 #[cfg(test)]
 mod known_poses;
 mod matrix;
+pub mod mesh_file;
 pub mod panel;
 mod problem;
 pub mod ranges;
