@@ -2,5 +2,6 @@
 
 pub mod error;
 pub mod geometry;
+pub mod scene;
 
 pub use error::{Error, Result};
