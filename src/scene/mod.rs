@@ -16,3 +16,6 @@ pub use frustum::Frustum;
 pub use panel::Panel;
 pub use problem::{BeamProblem, Given};
 pub use view::{Pose, View};
+
+pub mod phantoms;
+pub mod shape;
