@@ -41,6 +41,16 @@ pub enum Error {
         source: io::Error,
     },
 
+    /// Several things are wrong at once; each is told.
+    #[error("{count} problems")]
+    Several {
+        /// How many.
+        count: usize,
+        /// Each of them.
+        #[related]
+        errors: Vec<Error>,
+    },
+
     /// The user asked to stop (Ctrl-C, termination). No target file was left half-written.
     #[error("interrupted")]
     Interrupted,
@@ -74,6 +84,28 @@ impl Error {
     /// The operating system's refusal, with what was being done to which path.
     pub fn io(action: &'static str, path: &Path, source: io::Error) -> Self {
         Self::Io { action, path: path.to_owned(), source }
+    }
+
+    /// One error out of many: the only one there is, or all together. `errors` must not be empty.
+    pub fn several(mut errors: Vec<Self>) -> Self {
+        match errors.len() {
+            1 => errors.swap_remove(0),
+            count => Self::Several { count, errors },
+        }
+    }
+
+    /// The line of the scene file that the error marks, from 1.
+    pub fn line(&self) -> Option<usize> {
+        let Self::Scene(scene) = self else { return None };
+        let start = scene.span?.offset();
+        Some(scene.source_code.inner().get(..start)?.matches('\n').count() + 1)
+    }
+
+    /// The message with its cause, and the remedy, for use within another error.
+    pub fn into_words(self) -> (String, String) {
+        let remedy = self.help().map(|h| h.to_string()).unwrap_or_default();
+        let cause = std::error::Error::source(&self).map(|c| format!(": {c}")).unwrap_or_default();
+        (format!("{self}{cause}"), remedy)
     }
 
     /// The process exit code of this error: 130 for an interruption, 2 for everything else.

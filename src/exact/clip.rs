@@ -9,7 +9,7 @@
 //! There are no edge tests, hence no cracks: a ray through a vertex or along an edge is as good as any other.
 //! Cyrus & Beck 1978, doi:10.1016/0097-8493(78)90021-3.
 
-use crate::geometry::{ConvexMesh, Interval, Line};
+use crate::geometry::{Bounds, ConvexMesh, Interval, Line, Plane, Segment};
 
 /// Planes handled side by side; the compiler turns the inner loops into wide instructions.
 const LANES: usize = 4;
@@ -28,22 +28,24 @@ struct PlaneBlock {
 }
 
 impl ConvexClipper {
-    /// Lays out the planes of `body`.
+    /// Lays out all planes of `body`.
     pub fn new(body: &ConvexMesh) -> Self {
-        let blocks = body
-            .planes()
-            .chunks(LANES)
-            .map(|planes| {
-                let mut block = PlaneBlock::default();
-                for (lane, plane) in planes.iter().enumerate() {
-                    for axis in 0..3 {
-                        block.point[axis][lane] = plane.point[axis];
-                        block.normal[axis][lane] = plane.normal[axis];
-                    }
-                }
-                block
-            })
-            .collect();
+        Self::of_planes(body.planes())
+    }
+
+    fn of_planes<'a>(planes: impl Iterator<Item = &'a Plane>) -> Self {
+        let mut blocks: Vec<PlaneBlock> = Vec::new();
+        for (i, plane) in planes.enumerate() {
+            let lane = i % LANES;
+            if lane == 0 {
+                blocks.push(PlaneBlock::default());
+            }
+            let Some(block) = blocks.last_mut() else { continue };
+            for axis in 0..3 {
+                block.point[axis][lane] = plane.point[axis];
+                block.normal[axis][lane] = plane.normal[axis];
+            }
+        }
         Self { blocks }
     }
 
@@ -77,6 +79,71 @@ impl ConvexClipper {
             return None;
         }
         Interval::new(start, end)
+    }
+}
+
+/// A convex body narrowed to the planes that matter within a region, for many segments in that region.
+///
+/// Let F be the region (convex) and Q the intersection of the half-spaces of those faces that touch F. Q holds the
+/// body, so a segment that misses Q misses the body. And if the body meets F at all, the two are one within F: were
+/// a point p of Q ∩ F not in the body, the path within F from the body to p would leave the body through a face that
+/// touches F, and p would lie beyond that face's plane, hence not in Q. Whether the body meets F is proved by the
+/// first segment that all planes say hits; until then every hit is asked of all planes. If no face touches F, it
+/// lies wholly inside or wholly outside, and one segment tells for all.
+///
+/// So the chord is that of [`ConvexClipper::chord`] up to its error bound: a plane left out can only have been
+/// decisive within rounding.
+#[derive(Clone, Debug)]
+pub struct NarrowedClipper<'a> {
+    all: &'a ConvexClipper,
+    /// `None` if narrowing saves nothing.
+    near: Option<ConvexClipper>,
+    body_in_region: Known,
+}
+
+/// Whether a body meets a region.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Known {
+    NotYet,
+    Meets,
+    Misses,
+}
+
+impl<'a> NarrowedClipper<'a> {
+    /// Narrows `all`, the clipper of `body`, to a convex region. `may_touch` must be true for every box that shares
+    /// a point with the region.
+    pub fn new(body: &ConvexMesh, all: &'a ConvexClipper, may_touch: impl Fn(&Bounds) -> bool) -> Self {
+        let mut faces = Vec::new();
+        let mesh = body.surface().mesh();
+        body.surface().tree().visit(&may_touch, |face| {
+            if may_touch(&Bounds::of(mesh.triangle(face as usize))) {
+                faces.push(face as usize);
+            }
+        });
+        let near = (2 * faces.len() < mesh.faces.len())
+            .then(|| ConvexClipper::of_planes(faces.iter().filter_map(|&f| body.plane_of(f))));
+        Self { all, near, body_in_region: Known::NotYet }
+    }
+
+    /// The part of `segment`, which must lie in the region, in the body; mm from its source.
+    pub fn chord(&mut self, segment: &Segment) -> Option<Interval> {
+        let reach = segment.reach();
+        let chord_by = |clipper: &ConvexClipper| clipper.chord(segment.line())?.intersection(&reach);
+        let Some(near) = &self.near else { return chord_by(self.all) };
+        if self.body_in_region == Known::Misses {
+            return None;
+        }
+        let chord = chord_by(near)?;
+        if self.body_in_region == Known::Meets {
+            return Some(chord);
+        }
+        let chord = chord_by(self.all);
+        if chord.is_some() {
+            self.body_in_region = Known::Meets;
+        } else if near.blocks.is_empty() {
+            self.body_in_region = Known::Misses;
+        }
+        chord
     }
 }
 

@@ -11,7 +11,7 @@ pub mod clip;
 use glam::DVec3;
 
 use crate::geometry::{Bounds, ClosedMesh, ConvexMesh, Interval, Line, NotConvex, Segment};
-use clip::ConvexClipper;
+use clip::{ConvexClipper, NarrowedClipper};
 
 /// A closed body, ready for exact chords.
 #[derive(Clone, Debug)]
@@ -54,6 +54,14 @@ impl Body {
         }
     }
 
+    /// The engine that finds its chords.
+    pub fn engine(&self) -> &'static str {
+        match &self.form {
+            Form::Convex { .. } => "clip",
+            Form::General { .. } => "bvh",
+        }
+    }
+
     /// The box around it, mm.
     pub fn bounds(&self) -> Bounds {
         self.surface().bounds()
@@ -79,13 +87,54 @@ impl Body {
     /// or a target inside the body cuts its chord there.
     pub fn chords_of_segment(&self, segment: &Segment, parts: &mut Vec<Interval>) {
         self.chords(segment.line(), parts);
-        let reach = Interval::new(0.0, segment.length_mm()).unwrap_or(Interval::EVERYTHING);
-        parts.retain_mut(|part| match part.intersection(&reach) {
-            Some(within) if within.length() > 0.0 => {
-                *part = within;
-                true
-            }
-            _ => false,
-        });
+        keep_within(segment, parts);
     }
+
+    /// The body made ready for many segments in one convex region. `may_touch` must be
+    /// true for every box that shares a point with the region.
+    pub fn narrowed(&self, may_touch: impl Fn(&Bounds) -> bool) -> NarrowedBody<'_> {
+        match &self.form {
+            Form::Convex { mesh, clipper } => {
+                NarrowedBody::Convex(NarrowedClipper::new(mesh, clipper, may_touch))
+            }
+            Form::General { surface, .. } => NarrowedBody::General(surface),
+        }
+    }
+}
+
+/// A body made ready for many segments in one region: see [`Body::narrowed`].
+#[derive(Clone, Debug)]
+pub enum NarrowedBody<'a> {
+    /// A convex one.
+    Convex(NarrowedClipper<'a>),
+    /// Any other; its hierarchy is narrow enough.
+    General(&'a ClosedMesh),
+}
+
+impl NarrowedBody<'_> {
+    /// As [`Body::chords_of_segment`], for a segment in the region.
+    pub fn chords_of_segment(&mut self, segment: &Segment, parts: &mut Vec<Interval>) {
+        match self {
+            Self::Convex(clipper) => {
+                parts.clear();
+                parts.extend(clipper.chord(segment).filter(|part| part.length() > 0.0));
+            }
+            Self::General(surface) => {
+                bvh::chords(surface, segment.line(), parts);
+                keep_within(segment, parts);
+            }
+        }
+    }
+}
+
+/// Cuts parts of a segment's line to the segment.
+fn keep_within(segment: &Segment, parts: &mut Vec<Interval>) {
+    let reach = segment.reach();
+    parts.retain_mut(|part| match part.intersection(&reach) {
+        Some(within) if within.length() > 0.0 => {
+            *part = within;
+            true
+        }
+        _ => false,
+    });
 }

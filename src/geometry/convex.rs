@@ -24,7 +24,8 @@ pub struct Plane {
 #[derive(Clone, Debug)]
 pub struct ConvexMesh {
     surface: ClosedMesh,
-    planes: Vec<Plane>,
+    /// By face; a face without area has none.
+    planes: Vec<Option<Plane>>,
     reflex_depth_mm: f64,
 }
 
@@ -75,13 +76,13 @@ impl ConvexMesh {
             return Err(Box::new((surface, NotConvex::Handles(handles))));
         }
         // A face without area bounds nothing: its plane is left out, and its neighbours close the body.
-        let planes: Vec<Plane> = surface
+        let planes: Vec<Option<Plane>> = surface
             .mesh()
             .triangles()
-            .filter_map(|t| Some(Plane { point: t[0], normal: unit_normal(t)? }))
+            .map(|t| Some(Plane { point: t[0], normal: unit_normal(t)? }))
             .collect();
         let tolerance_mm = rounding_tolerance_mm(surface.mesh().vertices.iter());
-        let (depth_mm, place) = planes.iter().fold((0.0, DVec3::ZERO), |worst, plane| {
+        let (depth_mm, place) = planes.iter().flatten().fold((0.0, DVec3::ZERO), |worst, plane| {
             let (depth, vertex) = farthest_in_front(&surface, plane, worst.0);
             if depth > worst.0 { (depth, vertex) } else { worst }
         });
@@ -97,8 +98,13 @@ impl ConvexMesh {
     }
 
     /// The face planes, in the order of the faces; faces without area have none.
-    pub fn planes(&self) -> &[Plane] {
-        &self.planes
+    pub fn planes(&self) -> impl Iterator<Item = &Plane> {
+        self.planes.iter().flatten()
+    }
+
+    /// The plane of one face. `None` if it has no area.
+    pub fn plane_of(&self, face: usize) -> Option<&Plane> {
+        self.planes[face].as_ref()
     }
 
     /// How far the worst vertex stands out of a face's plane, mm: no more than rounding explains.
@@ -183,7 +189,7 @@ mod tests {
         for offset in [0.0, 1e3, 1e6] {
             let moved = |v: DVec3| 50.0 * v * DVec3::new(1.0, 0.2, 3.0) + offset;
             let body = convex(icosphere(3).map_vertices(moved)).expect("convex");
-            assert_eq!(body.planes().len(), 1280);
+            assert_eq!(body.planes().count(), 1280);
             assert!(body.reflex_depth_mm() <= 1e-9, "{offset}: {}", body.reflex_depth_mm());
         }
         assert_eq!(convex(cube(2.0)).expect("convex").reflex_depth_mm(), 0.0);

@@ -129,7 +129,8 @@ impl MeshFault {
                  `weld_mm` if neighbouring faces only nearly share their corners, or take the surface out of the scene"
             }
             Self::NotManifold { .. } => {
-                "remove doubled and inner faces (\"Remove Non-Manifold Edges\" in MeshLab), so that each edge has two"
+                "remove doubled and inner faces (\"Remove Non-Manifold Edges\" in MeshLab), or part solids that share an edge, \
+                 so that each edge has two faces"
             }
             Self::NotOrientable { .. } => "rebuild the surface; an organ needs an inside and an outside",
             Self::Flat { .. } => "give the organ a thickness, or take it out of the scene",

@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use super::Interval;
+
 /// A direction of unit length, finite by construction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnitDir(DVec3);
@@ -84,6 +86,12 @@ impl Segment {
     /// The supporting line; its origin is the source.
     pub fn line(&self) -> &Line {
         &self.line
+    }
+
+    /// The part of the line that is the path: from 0 to its length, mm.
+    pub fn reach(&self) -> Interval {
+        // The constructor keeps the length positive and finite.
+        Interval::new(0.0, self.length_mm).unwrap_or(Interval::EVERYTHING)
     }
 
     /// The distance from source to target, mm.

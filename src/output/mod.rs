@@ -1,8 +1,8 @@
 //! Outputs: images, volumes, meshes and tables on disk, each written whole or not at all.
 //!
 //! ```text
-//! FloatImage ─► png (to look at) │ metaimage, npy (to compute with)
-//! TriMesh    ─► obj
+//! Projection ─► projection ─► png (to look at) │ metaimage, npy (to compute with)
+//! Scene      ─► phantom    ─► obj
 //! any record ─► json
 //!                  └─► atomic: temporary file beside the target ─► flush ─► sync ─► rename
 //! ```
@@ -13,7 +13,10 @@ pub mod json;
 pub mod metaimage;
 pub mod npy;
 pub mod obj;
+pub mod phantom;
 pub mod png;
+pub mod projection;
+pub mod sidecar;
 
 pub use atomic::{create_folder, write_atomically};
 pub use image::{FloatImage, Geometry, Image};

@@ -1,21 +1,56 @@
-//! From what a user writes to what the engines need: beams as poses that hand out rays.
+//! From what a user writes to what the engines need: organs as proved bodies, beams as poses that hand out rays.
+//!
+//! ```text
+//! scene.toml ─► schema ─┬─► shapes, mesh files ─► body (closed? convex?) ─► nesting ─► Scene
+//!                       └─► [beam] ─► views    [spectrum] ─► photons
+//! ```
 
 pub mod beam;
+pub mod body;
+mod build;
+mod folder;
 mod frustum;
 pub mod iec;
 #[cfg(test)]
 mod known_poses;
 mod matrix;
 pub mod mesh_file;
+mod nesting;
+pub mod organ;
 pub mod panel;
+pub mod phantoms;
 mod problem;
 pub mod ranges;
+mod schema;
+pub mod shape;
+mod text;
 mod view;
 
+use crate::physics::{DetectorResponse, Spectrum};
+
+pub use folder::Folder;
 pub use frustum::Frustum;
+pub use organ::Organ;
 pub use panel::Panel;
 pub use problem::{BeamProblem, Given};
+pub use text::SceneText;
 pub use view::{Pose, View};
 
-pub mod phantoms;
-pub mod shape;
+/// Organs that do not cross, a beam and its photons: all that a study needs.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// What it is called.
+    pub name: String,
+    /// What it shows.
+    pub description: String,
+    /// The file it came from, or the phantom's name.
+    pub source: String,
+    /// The organs, in the file's order; nested or apart, never crossing.
+    pub organs: Vec<Organ>,
+    /// Where rays come from.
+    pub beam: beam::BeamSpec,
+    /// The photons before the patient, behind all filters.
+    pub spectrum: Spectrum,
+    /// What the detector makes of a photon.
+    pub response: DetectorResponse,
+}

@@ -13,7 +13,7 @@
 
 mod body;
 mod cut;
-mod frame;
+pub(super) mod frame;
 mod layout;
 mod solid;
 mod spec;

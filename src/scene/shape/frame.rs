@@ -11,7 +11,7 @@ const AXES_TOLERANCE: f64 = 5e-4;
 
 /// `organ = rotation · local + translation`, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Frame {
+pub(in crate::scene) struct Frame {
     /// `None` leaves every bit of a coordinate as it is.
     rotation: Option<DMat3>,
     translation: DVec3,
@@ -75,13 +75,13 @@ impl Frame {
     }
 
     /// A half-space of organ coordinates in local ones.
-    pub fn cut_to_local(self, cut: &Cut) -> Cut {
+    pub(super) fn cut_to_local(self, cut: &Cut) -> Cut {
         let normal = self.rotation.map_or(cut.normal, |r| r.transpose() * cut.normal);
         Cut { normal, offset: cut.offset - cut.normal.dot(self.translation) }
     }
 
     /// A half-space of local coordinates in organ ones.
-    pub fn cut_to_organ(self, cut: &Cut) -> Cut {
+    pub(super) fn cut_to_organ(self, cut: &Cut) -> Cut {
         let normal = self.rotation.map_or(cut.normal, |r| r * cut.normal);
         Cut { normal, offset: cut.offset + normal.dot(self.translation) }
     }

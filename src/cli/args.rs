@@ -1,0 +1,270 @@
+//! What can be said on the command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::output::png::Polarity;
+use crate::physics::DetectorResponse;
+
+/// Exact intersection lengths of rays with organs: projection images of phantoms, with their numbers.
+///
+/// Lengths are millimetres, angles degrees, energies keV; images are in the patient's LPS frame. Nothing is scattered:
+/// primary radiation only, for research and teaching, not for clinical use.
+#[derive(Debug, Parser)]
+#[command(name = "chordfield", version, max_term_width = 100)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+
+    /// Threads to use; all cores if left out. The answer does not depend on it.
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+
+    /// No progress bar and no remarks, errors only.
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Project a scene: radiographs to look at, lengths and attenuation to compute with.
+    Project(Box<ProjectArgs>),
+    /// Say whether scenes or mesh files can be projected, and if not, what to do about it.
+    Check(CheckArgs),
+    /// The phantoms that come with the program.
+    #[command(subcommand)]
+    Phantom(PhantomCommand),
+    /// Print a completion script for a shell.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+}
+
+/// `project`.
+#[derive(Debug, Args)]
+pub struct ProjectArgs {
+    /// A scene file, or the name of a phantom that comes with the program.
+    #[arg(default_value = "adult")]
+    pub scene: String,
+
+    /// The folder to write to; made if missing.
+    #[arg(long, short, default_value = "out", value_name = "DIR")]
+    pub output: PathBuf,
+
+    /// What to write.
+    #[arg(
+        long,
+        value_enum,
+        value_delimiter = ',',
+        value_name = "LIST",
+        default_value = "radiograph,colour,transmission,p,lengths"
+    )]
+    pub write: Vec<Product>,
+
+    /// Also write each float image as NPY.
+    #[arg(long)]
+    pub npy: bool,
+
+    /// Print the run's summary as JSON on standard output.
+    #[arg(long)]
+    pub json: bool,
+
+    /// Where rays come from, in place of what the scene says.
+    #[command(flatten)]
+    pub beam: BeamArgs,
+
+    /// What they are made of, in place of what the scene says.
+    #[command(flatten)]
+    pub photons: PhotonArgs,
+
+    /// The values of p shown as darkest and lightest; found from the image if left out.
+    #[arg(long, value_name = "LOW..HIGH", value_parser = parse_window, allow_hyphen_values = true)]
+    pub window: Option<[f64; 2]>,
+
+    /// Whether much attenuation is shown white, as on a film, or black.
+    #[arg(long, value_enum, default_value_t = PolarityArg::BoneWhite)]
+    pub polarity: PolarityArg,
+}
+
+/// Changes to the scene's `[beam]`.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Beam (in place of the scene's)")]
+pub struct BeamArgs {
+    /// Gantry angles, degrees: `30`, `0,90`, or `0..360:30`.
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    pub gantry: Option<String>,
+    /// Couch angles, degrees, as for the gantry.
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    pub couch: Option<String>,
+    /// Collimator angles, degrees, as for the gantry.
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    pub collimator: Option<String>,
+    /// Cone or parallel rays.
+    #[arg(long, value_enum)]
+    pub beam: Option<BeamKindArg>,
+    /// Source to isocentre, mm.
+    #[arg(long = "sad-mm", value_name = "MM")]
+    pub sad_mm: Option<f64>,
+    /// Source to detector, mm.
+    #[arg(long = "sdd-mm", value_name = "MM")]
+    pub sdd_mm: Option<f64>,
+    /// The isocentre, patient LPS, mm.
+    #[arg(long = "isocentre-mm", value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
+    pub isocentre_mm: Option<[f64; 3]>,
+    /// Detector pixels.
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = parse_pixels)]
+    pub size: Option<[u32; 2]>,
+    /// Detector width and height, mm.
+    #[arg(long = "detector-mm", value_name = "WIDTHxHEIGHT", value_parser = parse_extent)]
+    pub detector_mm: Option<[f64; 2]>,
+    /// Shift of the detector along its columns' and rows' axes (X and Y of the collimator), mm.
+    #[arg(long = "offset-mm", value_name = "X,Y", value_parser = parse_pair, allow_hyphen_values = true)]
+    pub offset_mm: Option<[f64; 2]>,
+}
+
+/// Changes to the scene's `[spectrum]`, and noise.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Photons (in place of the scene's)")]
+pub struct PhotonArgs {
+    /// One energy, keV.
+    #[arg(long = "energy-kev", value_name = "KEV", conflicts_with = "kvp")]
+    pub energy_kev: Option<f64>,
+    /// A tungsten tube at 60, 80, 100, 120 or 140 kV.
+    #[arg(long, value_name = "KV")]
+    pub kvp: Option<u32>,
+    /// What the detector makes of a photon.
+    #[arg(long, value_enum)]
+    pub response: Option<ResponseArg>,
+    /// Photons that would reach each pixel through air; turns Poisson noise on.
+    #[arg(long, value_name = "N")]
+    pub photons: Option<f64>,
+    /// The seed of the noise.
+    #[arg(long, default_value_t = 0, requires = "photons")]
+    pub seed: u64,
+}
+
+/// `check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// Scene files (`.toml`), mesh files (OBJ, STL, PLY) or names of phantoms.
+    #[arg(required = true)]
+    pub files: Vec<PathBuf>,
+    /// Print the findings as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `phantom`.
+#[derive(Debug, Subcommand)]
+pub enum PhantomCommand {
+    /// One line each.
+    List,
+    /// The scene file of one.
+    Show {
+        /// Its name.
+        name: String,
+    },
+    /// Write one as OBJ meshes and a scene that uses them.
+    Export {
+        /// Its name.
+        name: String,
+        /// The folder to write to; made if missing.
+        folder: PathBuf,
+    },
+}
+
+/// An output of `project`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Product {
+    /// 16-bit PNG of p, windowed.
+    Radiograph,
+    /// 8-bit colour PNG of the organs, see-through.
+    Colour,
+    /// Float image of I/I₀.
+    Transmission,
+    /// Float image of −ln(I/I₀).
+    P,
+    /// Float image of each organ's own length, mm.
+    Lengths,
+}
+
+/// [`Polarity`] as an argument.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum PolarityArg {
+    /// Much attenuation is white.
+    BoneWhite,
+    /// Much attenuation is black.
+    BoneBlack,
+}
+
+impl From<PolarityArg> for Polarity {
+    fn from(arg: PolarityArg) -> Self {
+        match arg {
+            PolarityArg::BoneWhite => Self::BoneWhite,
+            PolarityArg::BoneBlack => Self::BoneBlack,
+        }
+    }
+}
+
+/// [`DetectorResponse`] as an argument.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ResponseArg {
+    /// Its energy, as in flat panels.
+    EnergyIntegrating,
+    /// One count.
+    Counting,
+}
+
+impl From<ResponseArg> for DetectorResponse {
+    fn from(arg: ResponseArg) -> Self {
+        match arg {
+            ResponseArg::EnergyIntegrating => Self::EnergyIntegrating,
+            ResponseArg::Counting => Self::Counting,
+        }
+    }
+}
+
+/// A beam's kind as an argument.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum BeamKindArg {
+    /// From one point.
+    Cone,
+    /// All along one direction.
+    Parallel,
+}
+
+fn numbers<const N: usize, T: std::str::FromStr>(text: &str, separator: char) -> Result<[T; N], String> {
+    let parts: Vec<T> = text
+        .split(separator)
+        .map(|part| part.trim().parse().map_err(|_| format!("`{}` is not such a number", part.trim())))
+        .collect::<Result<_, _>>()?;
+    parts.try_into().map_err(|_| format!("give {N} numbers joined by `{separator}`"))
+}
+
+fn parse_point(text: &str) -> Result<[f64; 3], String> {
+    numbers(text, ',')
+}
+
+fn parse_pair(text: &str) -> Result<[f64; 2], String> {
+    numbers(text, ',')
+}
+
+fn parse_pixels(text: &str) -> Result<[u32; 2], String> {
+    numbers(text, 'x')
+}
+
+fn parse_extent(text: &str) -> Result<[f64; 2], String> {
+    numbers(text, 'x')
+}
+
+fn parse_window(text: &str) -> Result<[f64; 2], String> {
+    let (low, high) = text.split_once("..").ok_or("give two numbers joined by `..`")?;
+    match [low, high].map(|part| part.trim().parse::<f64>()) {
+        [Ok(low), Ok(high)] if low < high && low.is_finite() && high.is_finite() => Ok([low, high]),
+        _ => Err("give two finite numbers, the lower first, as `0..5`".into()),
+    }
+}

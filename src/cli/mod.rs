@@ -1,0 +1,59 @@
+//! The command line: from words to the library and back to words.
+
+pub mod args;
+mod check;
+mod phantom;
+mod project;
+mod session;
+
+use std::io::Write;
+
+use clap::CommandFactory;
+
+use crate::error::{Error, Result};
+use args::{Cli, Command};
+
+pub use session::Session;
+
+/// Does what the command line says; results go to `out`, remarks and progress to standard error.
+///
+/// # Errors
+/// What stopped the command. A refusal by `check` is [`Refused`](Outcome::Refused), not an error.
+pub fn run(cli: &Cli, session: &Session, out: &mut dyn Write) -> Result<Outcome> {
+    match &cli.command {
+        Command::Project(args) => project::run(args, session, out).map(|()| Outcome::Done),
+        Command::Check(args) => check::run(args, out),
+        Command::Phantom(command) => phantom::run(command, session, out).map(|()| Outcome::Done),
+        Command::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(*shell, &mut Cli::command(), "chordfield", &mut script);
+            print(out, &String::from_utf8_lossy(&script)).map(|()| Outcome::Done)
+        }
+    }
+}
+
+/// How a command ended that was not stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// All was done.
+    Done,
+    /// `check` found input that cannot be used; it said so on standard output.
+    Refused,
+}
+
+impl Outcome {
+    /// The process's exit code.
+    pub fn exit_code(self) -> u8 {
+        match self {
+            Self::Done => 0,
+            Self::Refused => 2,
+        }
+    }
+}
+
+/// Writes text to standard output.
+fn print(out: &mut dyn Write, text: &str) -> Result<()> {
+    out.write_all(text.as_bytes())
+        .and_then(|()| out.flush())
+        .map_err(|e| Error::io("write", std::path::Path::new("standard output"), e))
+}

@@ -1,0 +1,207 @@
+//! `chordfield project`.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::Path;
+use std::time::Instant;
+
+use super::args::{BeamArgs, BeamKindArg, PhotonArgs, Product, ProjectArgs};
+use super::{Session, print};
+use crate::error::{Error, Result};
+use crate::modes::Control;
+use crate::modes::project::{Projector, RayCounts, Wanted};
+use crate::output::projection::{self, Products};
+use crate::output::sidecar::{Sidecar, Summary, ViewRecord};
+use crate::output::{create_folder, json};
+use crate::physics::{PhotonNoise, Spectrum};
+use crate::scene::beam::{BeamKind, BeamSpec, DetectorSpec};
+use crate::scene::ranges::Angles;
+use crate::scene::{Given, Scene, View, phantoms};
+
+/// Projects a scene and writes what was asked for; the summary goes to `out` as JSON if asked for.
+pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result<()> {
+    let mut stages = Stages::start();
+    let mut scene = open(&args.scene)?;
+    change(&mut scene, &args.beam, &args.photons)?;
+    let views = scene.beam.views()?;
+    let labels = labels(&scene.name, &views);
+    let noise = args.photons.photons.map(|n| PhotonNoise::new(n, args.photons.seed)).transpose()?;
+    let products = products(args);
+    let projector = Projector::new(&scene, wanted(&products), noise)?;
+    create_folder(&args.output)?;
+    stages.end("load");
+
+    let rays: u64 = views.iter().map(|view| pixels(view)).sum();
+    let bar = session.progress(rays, "rays");
+    bar.set_message(scene.name.clone());
+    let advance = |rays| bar.inc(rays);
+    let control = Control::new(session.cancel(), &advance);
+    let mut counts = RayCounts::default();
+    let mut records = Vec::new();
+    for (index, (view, label)) in views.iter().zip(&labels).enumerate() {
+        let projection = projector.project(view, index as u64, &control)?;
+        counts += projection.counts();
+        stages.end("project");
+        let files = projection::write(&args.output, label, &scene, view, &projection, &products)?;
+        control.check()?;
+        stages.end("write");
+        records.push((view, label.clone(), files));
+    }
+    bar.finish_and_clear();
+
+    let files = records.iter().flat_map(|(_, _, files)| files);
+    let summary = Summary {
+        method: "exact",
+        views: views.len(),
+        organs: scene.organs.len(),
+        counts,
+        threads: rayon::current_num_threads(),
+        peak_bytes: peak_bytes(),
+        files: files.clone().count() + 1,
+        bytes_written: files.map(|f| f.bytes).sum(),
+        seconds: stages.seconds,
+    };
+    let views = records.into_iter().map(|(view, label, files)| ViewRecord::of(view, label, files)).collect();
+    let sidecar = Sidecar::new(&scene, noise, views, summary);
+    let record = args.output.join(format!("{}.json", projection::safe_name(&scene.name)));
+    json::write(&record, &sidecar)?;
+    let summary = sidecar.summary();
+    session.remark(&format!(
+        "{} files in {}; what they are is said in {}",
+        summary.files,
+        args.output.display(),
+        record.display()
+    ));
+    if args.json {
+        let text = serde_json::to_string_pretty(summary).unwrap_or_default();
+        print(out, &format!("{text}\n"))?;
+    }
+    Ok(())
+}
+
+/// The scene of a file, or the phantom of that name.
+pub fn open(scene: &str) -> Result<Scene> {
+    let path = Path::new(scene);
+    if !path.exists() && phantoms::find(scene).is_ok() {
+        return Scene::phantom(scene);
+    }
+    if !path.exists() && path.extension().is_none() {
+        let names: Vec<_> = phantoms::list().iter().map(|p| p.name).collect();
+        return Err(Error::input(
+            scene,
+            "there is no such file and no phantom of that name",
+            format!("give a scene file, or one of the phantoms {}", names.join(", ")),
+        ));
+    }
+    Scene::load(path)
+}
+
+/// Puts what the command line says in place of what the scene says.
+fn change(scene: &mut Scene, beam: &BeamArgs, photons: &PhotonArgs) -> Result<()> {
+    scene.beam = scene.beam.clone().overridden_by(beam_spec(beam)?);
+    if let Some(energy) = photons.energy_kev {
+        scene.spectrum = Spectrum::mono(energy)?;
+    }
+    if let Some(kvp) = photons.kvp {
+        scene.spectrum = Spectrum::tungsten(kvp)?;
+    }
+    if let Some(response) = photons.response {
+        scene.response = response.into();
+    }
+    Ok(())
+}
+
+fn beam_spec(args: &BeamArgs) -> Result<BeamSpec> {
+    let angles = |name: &str, text: &Option<String>| -> Result<Option<Given<Angles>>> {
+        let parse = |t: &String| {
+            t.parse::<Angles>().map_err(|problem| {
+                Error::input(format!("--{name} {t}"), problem, "give angles as `30`, `0,90` or `0..360:30`")
+            })
+        };
+        Ok(text.as_ref().map(parse).transpose()?.map(Given::from))
+    };
+    Ok(BeamSpec {
+        kind: args.beam.map(|kind| {
+            Given::from(match kind {
+                BeamKindArg::Cone => BeamKind::Cone,
+                BeamKindArg::Parallel => BeamKind::Parallel,
+            })
+        }),
+        sad_mm: args.sad_mm.map(Given::from),
+        sdd_mm: args.sdd_mm.map(Given::from),
+        isocentre_mm: args.isocentre_mm.map(Given::from),
+        gantry_deg: angles("gantry", &args.gantry)?,
+        couch_deg: angles("couch", &args.couch)?,
+        collimator_deg: angles("collimator", &args.collimator)?,
+        detector: DetectorSpec {
+            size_mm: args.detector_mm.map(Given::from),
+            pixels: args.size.map(Given::from),
+            offset_mm: args.offset_mm.map(Given::from),
+        },
+        ..BeamSpec::default()
+    })
+}
+
+fn products(args: &ProjectArgs) -> Products {
+    let has = |product| args.write.contains(&product);
+    Products {
+        radiograph: has(Product::Radiograph),
+        colour: has(Product::Colour),
+        transmission: has(Product::Transmission),
+        line_integral: has(Product::P),
+        lengths: has(Product::Lengths),
+        npy: args.npy,
+        window: args.window,
+        polarity: args.polarity.into(),
+    }
+}
+
+fn wanted(products: &Products) -> Wanted {
+    Wanted {
+        lengths: products.lengths,
+        attenuation: products.radiograph || products.transmission || products.line_integral,
+        colour: products.colour,
+    }
+}
+
+/// A name for each view's files: the scene's and the pose's; numbered where poses are alike.
+fn labels(scene: &str, views: &[View]) -> Vec<String> {
+    let plain: Vec<String> =
+        views.iter().map(|view| format!("{}-{}", projection::safe_name(scene), view.label())).collect();
+    let is_repeated = |label: &String| plain.iter().filter(|other| *other == label).count() > 1;
+    plain
+        .iter()
+        .enumerate()
+        .map(|(i, label)| if is_repeated(label) { format!("{label}-{i:03}") } else { label.clone() })
+        .collect()
+}
+
+fn pixels(view: &View) -> u64 {
+    let (columns, rows) = view.size();
+    u64::from(columns) * u64::from(rows)
+}
+
+/// Wall-clock time by stage.
+struct Stages {
+    last: Instant,
+    seconds: BTreeMap<&'static str, f64>,
+}
+
+impl Stages {
+    fn start() -> Self {
+        Self { last: Instant::now(), seconds: BTreeMap::new() }
+    }
+
+    /// Adds the time since the last stage ended to `stage`.
+    fn end(&mut self, stage: &'static str) {
+        *self.seconds.entry(stage).or_default() += self.last.elapsed().as_secs_f64();
+        self.last = Instant::now();
+    }
+}
+
+/// The most memory this process has held, where the system tells (Linux's `VmHWM`).
+fn peak_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kib| kib * 1024)
+}

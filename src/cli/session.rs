@@ -1,0 +1,49 @@
+//! What all commands share: a way to be stopped, and a terminal to report to or not.
+
+use std::io::IsTerminal;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// One run of the program.
+pub struct Session {
+    cancel: Arc<AtomicBool>,
+    talks: bool,
+}
+
+impl Session {
+    /// A session that talks to a terminal on standard error unless told to be quiet.
+    pub fn new(quiet: bool) -> Self {
+        Self { cancel: Arc::default(), talks: !quiet && std::io::stderr().is_terminal() }
+    }
+
+    /// The flag that stops the run's work when set.
+    pub fn cancel(&self) -> &AtomicBool {
+        &self.cancel
+    }
+
+    /// What to do when the user asks to stop.
+    pub fn canceller(&self) -> impl Fn() + Send + 'static {
+        let cancel = Arc::clone(&self.cancel);
+        move || cancel.store(true, Ordering::Relaxed)
+    }
+
+    /// A progress bar over `total` of `unit`, on a terminal only.
+    pub fn progress(&self, total: u64, unit: &str) -> ProgressBar {
+        let target = if self.talks { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let template = format!(
+            "{{msg:20}} [{{bar:32}}] {{percent:>3}} %  {{human_pos}} of {{human_len}} {unit}, {{eta}} left"
+        );
+        let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        ProgressBar::with_draw_target(Some(total), target).with_style(style.progress_chars("█▌ "))
+    }
+
+    /// A remark for a person watching; nothing when piped or quiet.
+    pub fn remark(&self, text: &str) {
+        if self.talks {
+            // A terminal that is gone has nobody to tell.
+            let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("{text}\n"));
+        }
+    }
+}

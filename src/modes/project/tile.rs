@@ -1,0 +1,161 @@
+//! One tile of a projection, from rays to values.
+
+use super::sweep::own_stretches;
+use super::{Projector, RayCounts, Region, Tile};
+use crate::geometry::{Interval, Segment};
+use crate::physics::composite::composite;
+use crate::physics::{Appearance, RowMass};
+use crate::scene::{Frustum, View};
+
+/// Traces tiles of one view.
+pub struct TileTracer<'a> {
+    projector: &'a Projector<'a>,
+    view: &'a View,
+    view_index: u64,
+    appearances: Vec<Appearance>,
+}
+
+/// The chords of one organ along the rays of a tile.
+struct OrganChords {
+    organ: usize,
+    /// Total length per ray, mm.
+    lengths: Vec<f64>,
+    /// Length left after the children's are taken off, mm.
+    own: Vec<f64>,
+}
+
+impl<'a> TileTracer<'a> {
+    pub fn new(projector: &'a Projector<'a>, view: &'a View, view_index: u64) -> Self {
+        let appearances = projector.scene.organs.iter().map(|o| o.appearance).collect();
+        Self { projector, view, view_index, appearances }
+    }
+
+    pub fn trace(&self, region: Region) -> Tile {
+        let frustum = self.view.frustum(region.columns.clone(), region.rows.clone());
+        let touched = self.touched(&frustum);
+        let counts = self.count(&region, touched.len());
+        let rays: Vec<Segment> = region
+            .rows
+            .clone()
+            .flat_map(|r| region.columns.clone().map(move |c| (c, r)))
+            .map(|(c, r)| self.view.segment(c, r))
+            .collect();
+
+        let wanted = self.projector.wanted;
+        let mut per_ray: Vec<Vec<(usize, Interval)>> =
+            vec![Vec::new(); if wanted.colour { rays.len() } else { 0 }];
+        let mut organs: Vec<OrganChords> =
+            touched.iter().map(|&organ| self.chords(organ, &frustum, &rays, &mut per_ray)).collect();
+        self.take_children_off(&mut organs);
+
+        let (line_integral, transmission) =
+            if wanted.attenuation { self.attenuate(&region, &organs) } else { Default::default() };
+        let colour = if wanted.colour && !organs.is_empty() { self.colour(&per_ray) } else { Vec::new() };
+        let lengths = if wanted.lengths { seen(&organs) } else { Vec::new() };
+        Tile { region, lengths, line_integral, transmission, colour, counts }
+    }
+
+    /// The organs to trace whose boxes the tile's rays may touch.
+    fn touched(&self, frustum: &Frustum) -> Vec<usize> {
+        let bounds = |organ: usize| self.projector.scene.organs[organ].body.bounds();
+        self.projector.traced.iter().copied().filter(|&organ| !frustum.misses(&bounds(organ))).collect()
+    }
+
+    fn count(&self, region: &Region, touched: usize) -> RayCounts {
+        let rays = region.pixels() as u64;
+        let (all, traced) = (self.projector.scene.organs.len() as u64, self.projector.traced.len() as u64);
+        RayCounts {
+            rays,
+            rays_skipped_by_bounds: if touched == 0 { rays } else { 0 },
+            organ_rays: rays * all,
+            organ_rays_exact: rays * touched as u64,
+            organ_rays_skipped_by_bounds: rays * (traced - touched as u64),
+            organ_rays_skipped_unneeded: rays * (all - traced),
+        }
+    }
+
+    fn chords(
+        &self,
+        organ: usize,
+        frustum: &Frustum,
+        rays: &[Segment],
+        per_ray: &mut [Vec<(usize, Interval)>],
+    ) -> OrganChords {
+        let body = &self.projector.scene.organs[organ].body;
+        let mut body = body.narrowed(|bounds| !frustum.misses(bounds));
+        let mut parts = Vec::new();
+        let lengths: Vec<f64> = rays
+            .iter()
+            .enumerate()
+            .map(|(i, ray)| {
+                body.chords_of_segment(ray, &mut parts);
+                if let Some(all) = per_ray.get_mut(i) {
+                    all.extend(parts.iter().map(|part| (organ, *part)));
+                }
+                parts.iter().map(Interval::length).sum::<f64>()
+            })
+            .collect();
+        OrganChords { organ, own: lengths.clone(), lengths }
+    }
+
+    /// Own length = chord − chords of the direct children.
+    fn take_children_off(&self, organs: &mut [OrganChords]) {
+        for child in 0..organs.len() {
+            let parent = self.projector.scene.organs[organs[child].organ].parent;
+            let Some(parent) = parent.and_then(|p| organs.iter().position(|o| o.organ == p)) else {
+                continue;
+            };
+            for ray in 0..organs[child].lengths.len() {
+                organs[parent].own[ray] -= organs[child].lengths[ray];
+            }
+        }
+        for organ in organs {
+            // Where parent and child share a surface, rounding may leave −1e-13 mm.
+            organ.own.iter_mut().for_each(|length| *length = length.max(0.0) + 0.0);
+        }
+    }
+
+    fn attenuate(&self, region: &Region, organs: &[OrganChords]) -> (Vec<f32>, Vec<f32>) {
+        let attenuator = &self.projector.attenuator;
+        let noise = self.projector.noise;
+        if organs.is_empty() && noise.is_none() {
+            return Default::default();
+        }
+        let mut masses = RowMass::new(attenuator, region.pixels());
+        for organ in organs {
+            attenuator.accumulate(organ.organ, &organ.own, &mut masses);
+        }
+        let mut p = vec![0.0; region.pixels()];
+        attenuator.line_integrals(&masses, &mut p);
+        let mut transmission: Vec<f64> = p.iter().map(|p| (-p).exp()).collect();
+        if let Some(noise) = noise {
+            let (columns, _) = self.view.size();
+            let pixels = region.rows.clone().flat_map(|r| region.columns.clone().map(move |c| (c, r)));
+            for (ray, (column, row)) in pixels.enumerate() {
+                let pixel = u64::from(row) * u64::from(columns) + u64::from(column);
+                transmission[ray] = noise.transmission(attenuator, &masses, ray, self.view_index, pixel);
+                p[ray] = noise.line_integral(transmission[ray]);
+            }
+        }
+        let narrow = |values: Vec<f64>| values.into_iter().map(|v| v as f32).collect();
+        (narrow(p), narrow(transmission))
+    }
+
+    fn colour(&self, per_ray: &[Vec<(usize, Interval)>]) -> Vec<[f32; 4]> {
+        let depth = |organ: usize| self.projector.scene.organs[organ].depth;
+        let (mut stops, mut own) = (Vec::new(), Vec::new());
+        per_ray
+            .iter()
+            .map(|chords| {
+                own_stretches(chords, depth, &mut stops, &mut own);
+                composite(&own, &self.appearances)
+            })
+            .collect()
+    }
+}
+
+/// The own lengths of those organs that at least one ray meets.
+fn seen(organs: &[OrganChords]) -> Vec<(usize, Vec<f32>)> {
+    let met = |o: &&OrganChords| o.own.iter().any(|&length| length > 0.0);
+    organs.iter().filter(met).map(|o| (o.organ, o.own.iter().map(|&l| l as f32).collect())).collect()
+}

@@ -1,0 +1,221 @@
+//! The files of one projected view.
+
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::png::{self, Labels, Window};
+use super::{FloatImage, Geometry, Image, create_folder, metaimage, npy};
+use crate::error::Result;
+use crate::modes::project::Projection;
+use crate::physics::composite::{encode_srgb8, over};
+use crate::scene::{Scene, View};
+
+/// What colour images have behind the organs: black, as a radiograph's air.
+const BACKGROUND: [f32; 3] = [0.0; 3];
+
+/// Which files to write, and how.
+#[derive(Clone, Debug)]
+pub struct Products {
+    /// 16-bit PNG of p.
+    pub radiograph: bool,
+    /// 8-bit PNG of the organs in colour.
+    pub colour: bool,
+    /// Float image of T.
+    pub transmission: bool,
+    /// Float image of p.
+    pub line_integral: bool,
+    /// Float image of each organ's own length.
+    pub lengths: bool,
+    /// Each float image also as NPY.
+    pub npy: bool,
+    /// The radiograph's window; found from the image if `None`.
+    pub window: Option<[f64; 2]>,
+    /// Which end of the window is white.
+    pub polarity: png::Polarity,
+}
+
+/// One written file, for the sidecar.
+#[derive(Clone, Debug, Serialize)]
+pub struct WrittenFile {
+    /// Its path within the output folder.
+    pub file: String,
+    /// What its pixels are.
+    pub quantity: String,
+    /// Their unit; `1` for a ratio.
+    pub unit: &'static str,
+    /// The organ, where the file is about one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub organ: Option<String>,
+    /// The values of p at the grey scale's ends, where it is a windowed picture.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub window: Option<[f64; 2]>,
+    /// Which end of the window is white.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub polarity: Option<&'static str>,
+    /// Its size.
+    pub bytes: u64,
+}
+
+/// Writes the products of a view into `folder`, under names that start with `stem`; returns them in order.
+///
+/// # Errors
+/// The first file that cannot be written. Files are whole or absent.
+pub fn write(
+    folder: &Path,
+    stem: &str,
+    scene: &Scene,
+    view: &View,
+    projection: &Projection,
+    products: &Products,
+) -> Result<Vec<WrittenFile>> {
+    let writer = ViewWriter { folder, stem, view, projection, products, geometry: geometry(view)? };
+    let mut files = Vec::new();
+    if products.radiograph || products.line_integral {
+        let p = writer.float_image(projection.line_integral())?;
+        if products.radiograph {
+            files.push(writer.radiograph(&p)?);
+        }
+        if products.line_integral {
+            files.extend(writer.floats("p", &p, "p = -ln(I/I0)", "1", None)?);
+        }
+    }
+    if products.colour {
+        files.push(writer.colour()?);
+    }
+    if products.transmission {
+        let t = writer.float_image(projection.transmission())?;
+        files.extend(writer.floats("transmission", &t, "transmission I/I0", "1", None)?);
+    }
+    if products.lengths {
+        create_folder(&folder.join(writer.lengths_folder()))?;
+        let lengths: Vec<Vec<WrittenFile>> = file_stems(scene)
+            .par_iter()
+            .enumerate()
+            .map(|(organ, stem)| {
+                let image = writer.float_image(projection.own_length_mm(organ))?;
+                let name = &scene.organs[organ].name;
+                writer.floats(stem, &image, &format!("own length in {name}"), "mm", Some(name))
+            })
+            .collect::<Result<_>>()?;
+        files.extend(lengths.into_iter().flatten());
+    }
+    Ok(files)
+}
+
+/// A file name for each organ: its own name where that is safe everywhere, numbered where two would be alike.
+pub fn file_stems(scene: &Scene) -> Vec<String> {
+    let mut stems: Vec<String> = Vec::new();
+    for (i, organ) in scene.organs.iter().enumerate() {
+        let stem = safe_name(&organ.name);
+        let is_taken = stems.iter().any(|other| other.to_lowercase() == stem.to_lowercase());
+        stems.push(if is_taken { format!("{stem}-{}", i + 1) } else { stem });
+    }
+    stems
+}
+
+/// `name` with everything but letters, digits, `-` and `_` replaced, so that it is one file name on every system.
+pub fn safe_name(name: &str) -> String {
+    name.chars().map(|c| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' }).collect()
+}
+
+/// Where the view's pixels are. The slice is as thick as a pixel is wide, for readers that draw volumes.
+fn geometry(view: &View) -> Result<Geometry> {
+    let [column_axis, row_axis, _] = view.direction();
+    let (width, height) = view.spacing_mm();
+    Geometry::new(view.origin_mm(), column_axis, row_axis, [width, height, width])
+}
+
+struct ViewWriter<'a> {
+    folder: &'a Path,
+    stem: &'a str,
+    view: &'a View,
+    projection: &'a Projection,
+    products: &'a Products,
+    geometry: Geometry,
+}
+
+impl ViewWriter<'_> {
+    fn float_image(&self, pixels: Vec<f32>) -> Result<FloatImage> {
+        let (columns, rows) = self.projection.size();
+        FloatImage::new(columns as usize, rows as usize, pixels)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    fn lengths_folder(&self) -> String {
+        format!("{}-lengths", self.stem)
+    }
+
+    fn labels(&self) -> Labels<'static> {
+        let (width, height) = self.view.spacing_mm();
+        const TEXTS: &[(&str, &str)] = &[("Software", concat!("chordfield ", env!("CARGO_PKG_VERSION")))];
+        Labels { pixel_mm: Some([width, height]), texts: TEXTS }
+    }
+
+    fn radiograph(&self, p: &FloatImage) -> Result<WrittenFile> {
+        let polarity = self.products.polarity;
+        // From 0, so that air is the end of the scale in every view.
+        let [low, high] = self.products.window.unwrap_or_else(|| [0.0, png::auto_window(p).high()]);
+        let window = Window::new(low, high, polarity).unwrap_or_else(|| png::auto_window(p));
+        let file = format!("{}-radiograph.png", self.stem);
+        let bytes = png::write_grey(&self.path(&file), p, &window, "p = -ln(I/I0), no unit", self.labels())?;
+        Ok(WrittenFile {
+            file,
+            quantity: "p = -ln(I/I0), windowed to 16-bit grey".into(),
+            unit: "1",
+            organ: None,
+            window: Some([window.low(), window.high()]),
+            polarity: Some(window.polarity().name()),
+            bytes,
+        })
+    }
+
+    fn colour(&self) -> Result<WrittenFile> {
+        let pixels =
+            self.projection.colour().into_iter().map(|c| encode_srgb8(over(c, BACKGROUND))).collect();
+        let (columns, rows) = self.projection.size();
+        let image = Image::new(columns as usize, rows as usize, pixels)?;
+        let file = format!("{}-colour.png", self.stem);
+        let bytes = png::write_rgb(&self.path(&file), &image, self.labels())?;
+        let quantity = "organs composited front to back, sRGB".into();
+        Ok(WrittenFile { file, quantity, unit: "1", organ: None, window: None, polarity: None, bytes })
+    }
+
+    /// A float image as MetaImage, and as NPY if asked for.
+    fn floats(
+        &self,
+        name: &str,
+        image: &FloatImage,
+        quantity: &str,
+        unit: &'static str,
+        organ: Option<&str>,
+    ) -> Result<Vec<WrittenFile>> {
+        let base = match organ {
+            Some(_) => format!("{}/{name}", self.lengths_folder()),
+            None => format!("{}-{name}", self.stem),
+        };
+        let record = |file: String, bytes: u64| WrittenFile {
+            file,
+            quantity: quantity.to_owned(),
+            unit,
+            organ: organ.map(str::to_owned),
+            window: None,
+            polarity: None,
+            bytes,
+        };
+        let mha = format!("{base}.mha");
+        let comment = format!("{quantity}, unit {unit}, patient LPS mm");
+        let bytes = metaimage::write(&self.path(&mha), image, &self.geometry, &comment)?;
+        let mut files = vec![record(mha, bytes)];
+        if self.products.npy {
+            let file = format!("{base}.npy");
+            let bytes = npy::write(&self.path(&file), image)?;
+            files.push(record(file, bytes));
+        }
+        Ok(files)
+    }
+}
