@@ -1,4 +1,32 @@
-//! Exact and interpolated intersection lengths of rays with organs.
+//! Exact intersection lengths of rays with organs, and the images that follow from them.
+//!
+//! A [`Scene`](scene::Scene) is a set of closed organ surfaces that do not cross; they may be nested. For each ray
+//! the library finds how many millimetres lie in each organ and in none of the organs within it. From lengths come
+//! attenuated projections for any spectrum.
+//!
+//! ```text
+//! scene.toml ─► scene ─► geometry ─► exact ─► modes ─► output
+//!               (units,  (closed?    (clip,   (project) (images,
+//!                frames)  convex?)    bvh)               records)
+//! ```
+//!
+//! Each room imports from its left only. Lengths are mm, angles degrees, energies keV, densities g/cm³, attenuation
+//! coefficients cm⁻¹; points are in the patient's LPS frame (+x left, +y back, +z head).
+//!
+//! ```
+//! use chordfield::modes::{Control, project::{Projector, Wanted}};
+//! use chordfield::scene::Scene;
+//!
+//! let scene = Scene::phantom("calibration")?;
+//! let wanted = Wanted { lengths: true, attenuation: true, colour: false };
+//! let projector = Projector::new(&scene, wanted, None)?;
+//! for (i, view) in scene.beam.views()?.iter().enumerate() {
+//!     let projection = projector.project(view, i as u64, &Control::none())?;
+//!     let longest = projection.own_length_mm(0).into_iter().fold(0.0, f32::max);
+//!     assert!(longest > 0.0, "{} is in the picture", scene.organs[0].name);
+//! }
+//! # Ok::<(), chordfield::Error>(())
+//! ```
 
 pub mod cli;
 pub mod error;
