@@ -31,7 +31,7 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
     create_folder(&args.output)?;
     stages.end("load");
 
-    let rays: u64 = views.iter().map(|view| pixels(view)).sum();
+    let rays: u64 = views.iter().map(pixels).sum();
     let bar = session.progress(rays, "rays");
     bar.set_message(scene.name.clone());
     let advance = |rays| bar.inc(rays);

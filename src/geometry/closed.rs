@@ -108,13 +108,13 @@ impl ClosedMesh {
 
     /// The distance from `point` to the surface, mm, in f64.
     pub fn distance_mm(&self, point: DVec3) -> f64 {
-        let nearest = std::cell::Cell::new(f64::INFINITY);
+        let to_face = |f: usize| super::predicates::squared_distance(point, self.mesh.triangle(f));
+        // Any face bounds the search; a few spread over the mesh bound it well.
+        let few = (0..self.mesh.faces.len()).step_by(1 + self.mesh.faces.len() / 16).map(to_face);
+        let nearest = std::cell::Cell::new(few.fold(f64::INFINITY, f64::min));
         self.tree.visit(
             |b| (point.clamp(b.min, b.max) - point).length_squared() < nearest.get(),
-            |f| {
-                let d = super::predicates::squared_distance(point, self.mesh.triangle(f as usize));
-                nearest.set(nearest.get().min(d));
-            },
+            |f| nearest.set(nearest.get().min(to_face(f as usize))),
         );
         nearest.get().sqrt()
     }

@@ -8,8 +8,10 @@
 //!      h───────────h
 //! ```
 
+use std::collections::HashMap;
+
 use glam::DVec3;
-use robust::{Coord3D, orient3d};
+use robust::{Coord, Coord3D, orient2d, orient3d};
 
 use super::{Bounds, TriMesh};
 
@@ -190,23 +192,30 @@ impl<'a> Quickhull<'a> {
 
     /// The faces `apex` sees, grown from `first`, and the edges around them.
     ///
-    /// A face whose plane holds the apex counts as seen: it is re-triangulated with the apex. So an edge of the
-    /// horizon borders a face strictly below the apex, the apex is never on that edge's line, and no new face has
-    /// zero area.
+    /// A face whose plane holds the apex stays, as if the apex were a trifle nearer to the hull, and a flat side grows
+    /// by a triangle. If the apex is on the line of a horizon edge, that triangle would have zero area: then
+    /// all faces whose planes hold the apex go too, the flat side is triangulated anew from the apex, and every
+    /// horizon edge borders a face strictly below the apex, so none is on a line with it.
     fn faces_seen_from(&self, apex: u32, first: u32) -> (Vec<u32>, Vec<HorizonEdge>) {
+        let (seen, horizon) = self.grow_seen(apex, first, |orientation| orientation < 0.0);
+        if horizon.iter().any(|edge| self.collinear(edge.start, edge.end, apex)) {
+            return self.grow_seen(apex, first, |orientation| orientation <= 0.0);
+        }
+        (seen, horizon)
+    }
+
+    fn grow_seen(&self, apex: u32, first: u32, sees: impl Fn(f64) -> bool) -> (Vec<u32>, Vec<HorizonEdge>) {
         let mut seen = vec![first];
-        let mut is_seen = std::collections::HashMap::from([(first, true)]);
+        let mut is_seen = HashMap::from([(first, true)]);
         let mut horizon = Vec::new();
         let mut next = 0;
         while next < seen.len() {
-            let corners = self.faces[seen[next] as usize].corners;
-            let across = self.faces[seen[next] as usize].across;
+            let Face { corners, across, .. } = self.faces[seen[next] as usize];
             for i in 0..3 {
                 let neighbour = across[i];
                 let known = is_seen.get(&neighbour).copied();
-                let visible = known.unwrap_or_else(|| {
-                    self.orientation(&self.faces[neighbour as usize].corners, apex) <= 0.0
-                });
+                let visible = known
+                    .unwrap_or_else(|| sees(self.orientation(&self.faces[neighbour as usize].corners, apex)));
                 is_seen.insert(neighbour, visible);
                 if !visible {
                     let (start, end) = (corners[i], corners[(i + 1) % 3]);
@@ -218,6 +227,15 @@ impl<'a> Quickhull<'a> {
             next += 1;
         }
         (seen, horizon)
+    }
+
+    /// Whether three points are on one line; exact: their shadows on the three coordinate planes are.
+    fn collinear(&self, a: u32, b: u32, c: u32) -> bool {
+        let points = [a, b, c].map(|v| self.at(v));
+        [[0, 1], [1, 2], [2, 0]].into_iter().all(|[i, j]| {
+            let [a, b, c] = points.map(|p| Coord { x: p[i], y: p[j] });
+            orient2d(a, b, c) == 0.0
+        })
     }
 
     /// Joins the apex to every edge of the horizon, in the walk's order.

@@ -39,20 +39,19 @@ pub fn relation(a: &ClosedMesh, b: &ClosedMesh) -> Relation {
         return Relation::Disjoint;
     }
     let contact = surface_contact(a, b);
-    let depth_a = Depths::measure(&probes(a, contact.surfaces_meet, &contact.on_edges_of_a), b);
-    let depth_b = Depths::measure(&probes(b, contact.surfaces_meet, &contact.on_edges_of_b), a);
     let tolerance =
         rounding_tolerance_mm(a.mesh().vertices.iter()) + rounding_tolerance_mm(b.mesh().vertices.iter());
+    let a_in_b = Spread::of(probes(a, contact.surfaces_meet, &contact.on_edges_of_a), b, tolerance);
+    let b_in_a = Spread::of(probes(b, contact.surfaces_meet, &contact.on_edges_of_b), a, tolerance);
 
-    let nothing_shared = depth_a.inside.0 <= tolerance && depth_b.inside.0 <= tolerance;
-    let (a_within, b_within) = (depth_a.outside <= tolerance, depth_b.outside <= tolerance);
-    match (nothing_shared, a_within, b_within) {
-        (true, ..) => Relation::Disjoint,
-        (false, true, false) => Relation::Inside,
-        (false, false, true) => Relation::Around,
-        _ => {
-            let (depth_mm, place) =
-                if depth_a.inside.0 >= depth_b.inside.0 { depth_a.inside } else { depth_b.inside };
+    let share_volume = !a_in_b.inside.is_empty() || !b_in_a.inside.is_empty();
+    match (share_volume, a_in_b.reaches_out, b_in_a.reaches_out) {
+        (false, ..) => Relation::Disjoint,
+        (true, false, true) => Relation::Inside,
+        (true, true, false) => Relation::Around,
+        (true, ..) => {
+            let deepest = [a_in_b.deepest_in(b), b_in_a.deepest_in(a)];
+            let (depth_mm, place) = if deepest[0].0 >= deepest[1].0 { deepest[0] } else { deepest[1] };
             Relation::Crossing { place, depth_mm }
         }
     }
@@ -158,28 +157,35 @@ fn points_inside(body: &ClosedMesh) -> Vec<DVec3> {
         .collect()
 }
 
-/// How deep probes lie in a body, and how far out of it, mm.
-struct Depths {
-    inside: (f64, DVec3),
-    outside: f64,
+/// Where the probes of one body lie in another.
+struct Spread {
+    /// Those that lie in it deeper than the tolerance.
+    inside: Vec<DVec3>,
+    /// Whether some lie out of it farther than the tolerance.
+    reaches_out: bool,
 }
 
-impl Depths {
-    fn measure(points: &[DVec3], body: &ClosedMesh) -> Self {
-        let mut depths = Self { inside: (0.0, DVec3::ZERO), outside: 0.0 };
-        for &p in points {
+impl Spread {
+    fn of(probes: Vec<DVec3>, body: &ClosedMesh, tolerance_mm: f64) -> Self {
+        let mut spread = Self { inside: Vec::new(), reaches_out: false };
+        for p in probes {
             match body.side_of(p) {
                 Side::On => {}
-                Side::Inside => {
-                    let d = body.distance_mm(p);
-                    if d >= depths.inside.0 {
-                        depths.inside = (d, p);
-                    }
+                Side::Inside if body.distance_mm(p) > tolerance_mm => spread.inside.push(p),
+                Side::Inside => {}
+                // One far enough out tells all; distances are the costly part.
+                Side::Outside => {
+                    spread.reaches_out = spread.reaches_out || body.distance_mm(p) > tolerance_mm;
                 }
-                Side::Outside => depths.outside = depths.outside.max(body.distance_mm(p)),
             }
         }
-        depths
+        spread
+    }
+
+    /// The depth and the place of the deepest probe, mm.
+    fn deepest_in(&self, body: &ClosedMesh) -> (f64, DVec3) {
+        let depths = self.inside.iter().map(|&p| (body.distance_mm(p), p));
+        depths.fold((0.0, DVec3::ZERO), |best, next| if next.0 > best.0 { next } else { best })
     }
 }
 

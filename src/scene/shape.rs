@@ -58,15 +58,14 @@ pub struct Shape {
     faces: usize,
 }
 
-/// A mesh and how deep it lies under the true surface at worst, mm.
-struct Tessellation {
-    mesh: TriMesh,
-    depth_mm: f64,
-}
-
 /// How near the number of faces comes to the number asked for, as a ratio. Points stand on rings of whole numbers of
 /// quarters, so small meshes cannot do better.
 const FACES_RATIO: f64 = 1.05;
+
+/// How much finer than the whole body's its points may be after cuts, as a ratio of spacings. A cut that leaves less
+/// than about this ratio squared of the curved surface gives fewer faces than asked for, instead of points without
+/// end on what was cut away.
+const FINEST_AFTER_CUTS: f64 = 0.2;
 
 impl Shape {
     /// Whether the kind of shape is convex, whatever its numbers and cuts: its mesh is then convex exactly.
@@ -77,10 +76,10 @@ impl Shape {
     /// A closed mesh of about the asked number of faces, every vertex on the true surface (inner walls of tubes:
     /// within it), mm. Convex kinds give a mesh that is convex exactly.
     ///
-    /// Boxes and hulls have as many faces as they have. Errors if the cuts leave nothing, or leave a tube in
+    /// Boxes and hulls have as many faces as they have; a body cut down to a sliver has fewer. Errors if the cuts leave nothing, or leave a tube in
     /// pieces.
     pub fn tessellate(&self) -> Result<TriMesh, ShapeProblem> {
-        Ok(self.tessellation()?.mesh)
+        Ok(self.mesh_and_depth(false)?.0)
     }
 
     /// How deep the mesh lies under the true surface at worst, mm: measured along face normals on a grid in each
@@ -88,7 +87,7 @@ impl Shape {
     ///
     /// Errors where [`Self::tessellate`] does.
     pub fn tessellation_depth_mm(&self) -> Result<f64, ShapeProblem> {
-        Ok(self.tessellation()?.depth_mm)
+        Ok(self.mesh_and_depth(true)?.1)
     }
 
     /// The volume of the true body, mm³. Closed forms; smooth bodies with cuts by adaptive quadrature of exact slice
@@ -136,18 +135,19 @@ impl Shape {
         }
     }
 
-    fn tessellation(&self) -> Result<Tessellation, ShapeProblem> {
+    /// The mesh, and how deep it lies, mm; 0 for smooth kinds unless measuring was asked for, which costs more than the mesh.
+    fn mesh_and_depth(&self, measure: bool) -> Result<(TriMesh, f64), ShapeProblem> {
         let local_cuts: Vec<Cut> = self.cuts.iter().map(|cut| self.frame.cut_to_local(cut)).collect();
         match &self.solid {
-            Solid::Smooth(smooth) => self.tessellate_smooth(smooth),
-            Solid::Polytope(mesh) => self.tessellate_polytope(mesh),
+            Solid::Smooth(smooth) => self.tessellate_smooth(smooth, measure),
+            Solid::Polytope(mesh) => Ok((self.tessellate_polytope(mesh)?, 0.0)),
             Solid::EllipticTube(tube) => {
                 let (mesh, depth_mm) = tube.tessellate(&local_cuts, self.faces)?;
-                Ok(Tessellation { mesh: self.placed(mesh), depth_mm })
+                Ok((self.placed(mesh), depth_mm))
             }
             Solid::TorusSector(torus) => {
                 let (mesh, depth_mm) = torus.tessellate(self.faces);
-                Ok(Tessellation { mesh: self.placed(mesh), depth_mm })
+                Ok((self.placed(mesh), depth_mm))
             }
         }
     }
@@ -156,29 +156,30 @@ impl Shape {
         mesh.map_vertices(|p| self.frame.to_organ(p))
     }
 
-    fn tessellate_smooth(&self, smooth: &Smooth) -> Result<Tessellation, ShapeProblem> {
+    fn tessellate_smooth(&self, smooth: &Smooth, measure: bool) -> Result<(TriMesh, f64), ShapeProblem> {
         let body = smooth.body();
         let cut_body = CutBody { body: &body, frame: self.frame, cuts: &self.cuts };
         let uncut = |spacing: f64| -> Vec<DVec3> {
             smooth.points(spacing).into_iter().map(|p| self.frame.to_organ(p)).collect()
         };
         let coarse = Bounds::of(uncut(f64::MAX)).diagonal();
-        let spacing = spacing_for(self.faces, coarse, |h| hull_faces(uncut(h).len()));
+        let spacing = spacing_for(self.faces, [coarse, 0.0], |h| hull_faces(uncut(h).len()));
         let rough = hull(&uncut(spacing))?;
         let mesh = if self.cuts.is_empty() {
             rough
         } else {
             let plan = CutPlan::new(&cut_body, &rough);
             let points = |h: f64| plan.points(&uncut(h), h);
-            let spacing = spacing_for(self.faces, coarse, |h| hull_faces(points(h).len()));
+            let range = [coarse, spacing * FINEST_AFTER_CUTS];
+            let spacing = spacing_for(self.faces, range, |h| hull_faces(points(h).len()));
             hull(&points(spacing))?
         };
-        let depth_mm = measured_depth(&cut_body, &mesh);
-        Ok(Tessellation { mesh, depth_mm })
+        let depth_mm = if measure { measured_depth(&cut_body, &mesh) } else { 0.0 };
+        Ok((mesh, depth_mm))
     }
 
     /// Clips a polyhedron by one half-space after the other: corners within, and crossings of edges.
-    fn tessellate_polytope(&self, mesh: &TriMesh) -> Result<Tessellation, ShapeProblem> {
+    fn tessellate_polytope(&self, mesh: &TriMesh) -> Result<TriMesh, ShapeProblem> {
         let mut mesh = self.placed(mesh.clone());
         for cut in &self.cuts {
             let mut points: Vec<DVec3> =
@@ -193,7 +194,7 @@ impl Shape {
             }
             mesh = hull(&points)?;
         }
-        Ok(Tessellation { mesh, depth_mm: 0.0 })
+        Ok(mesh)
     }
 }
 
@@ -215,11 +216,12 @@ fn hull_faces(points: usize) -> usize {
     (2 * points).saturating_sub(4)
 }
 
-/// The spacing, mm, that gives about the wanted number of faces; `faces_at` grows as the spacing shrinks.
-fn spacing_for(wanted: usize, coarse: f64, faces_at: impl Fn(f64) -> usize) -> f64 {
+/// The spacing, mm, within `[coarse, finest]` that gives about the wanted number of faces; `faces_at` grows as the
+/// spacing shrinks.
+fn spacing_for(wanted: usize, [coarse, finest]: [f64; 2], faces_at: impl Fn(f64) -> usize) -> f64 {
     let (mut high, mut low) = (coarse, coarse);
     // Steps small enough that no trial has many times the faces wanted.
-    while faces_at(low) < wanted && low > 1e-6 * coarse {
+    while faces_at(low) < wanted && low > finest {
         (high, low) = (low, 0.7 * low);
     }
     let off = |faces: usize| (faces as f64 / wanted as f64).max(wanted as f64 / faces.max(1) as f64);

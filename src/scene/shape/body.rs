@@ -83,17 +83,21 @@ fn in_upper_nappe(at: DVec3, by: DVec3) -> Option<Interval> {
     let middle = -b / a;
     let m = at + middle * by;
     let reduced = (m.x * m.x + m.y * m.y - m.z * m.z) / a;
+    let half = (-reduced).max(0.0).sqrt();
+    let (mut low, mut high) = (middle - half, middle + half);
+    // Nearly along the mantle the vertex is far away and the nearer root a small difference of large numbers: take
+    // it from the product of the roots instead.
+    if a.abs() < 1e-3 * scale {
+        let far = if middle > 0.0 { high } else { low };
+        *(if middle > 0.0 { &mut low } else { &mut high }) = c / (a * far);
+    }
     if a > 0.0 {
-        let half = (reduced <= 0.0).then(|| (-reduced).sqrt())?;
-        (m.z >= 0.0).then(|| Interval::new(middle - half, middle + half))?
-    } else {
+        (reduced <= 0.0 && m.z >= 0.0).then(|| Interval::new(low, high))?
+    } else if by.z > 0.0 {
         // Steeper than the mantle: inside both nappes, one from each root on.
-        let half = (-reduced).max(0.0).sqrt();
-        if by.z > 0.0 {
-            Interval::new(middle + half, f64::INFINITY)
-        } else {
-            Interval::new(f64::NEG_INFINITY, middle - half)
-        }
+        Interval::new(high, f64::INFINITY)
+    } else {
+        Interval::new(f64::NEG_INFINITY, low)
     }
 }
 

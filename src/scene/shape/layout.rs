@@ -9,8 +9,8 @@ use std::f64::consts::FRAC_PI_2;
 use glam::DVec3;
 
 /// Steps of the length table of a quarter arc. The table only sets the spacing: points are on the ellipse whatever
-/// it says, and 256 steps even out spacing to better than 1 % up to aspect ratios of about 50.
-const ARC_STEPS: usize = 256;
+/// it says, and 96 steps even out spacing to a few per cent up to aspect ratios of about 20.
+const ARC_STEPS: usize = 96;
 
 /// Semi-axes towards −x, −y, −z and +x, +y, +z, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]

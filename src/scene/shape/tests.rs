@@ -40,8 +40,8 @@ fn smooth_shapes() -> Vec<Shape> {
             format!("{{ normal = [{}, {}, {}], offset_mm = {d} }}", n.x, n.y, n.z)
         };
         let (a, b, c) =
-            (at(DVec3::X, 4.0), at(DVec3::new(0.3, -1.0, 0.4), 7.0), at(DVec3::new(0.1, 0.2, -1.0), 9.0));
-        let sliver = at(DVec3::new(1.0, 1.0, 1.0), 11.0);
+            (at(DVec3::X, 14.0), at(DVec3::new(0.3, -1.0, 0.4), 17.0), at(DVec3::new(0.1, 0.2, -1.0), 19.0));
+        let sliver = at(DVec3::new(1.0, 1.0, 1.0), 21.0);
         [
             String::new(),
             format!("cuts = [{a}]"),
@@ -51,9 +51,15 @@ fn smooth_shapes() -> Vec<Shape> {
     };
     let mut shapes = Vec::new();
     for kind in kinds {
-        for (i, place) in places.iter().enumerate() {
-            let middle = [DVec3::ZERO, DVec3::new(5.0, 6.0, 7.0), DVec3::new(500.0, -300.0, 1000.0)][i];
-            for cut in cuts(middle) {
+        for place in places {
+            let whole = shape(&format!(
+                "{kind}
+{place}
+faces = 64"
+            ))
+            .tessellate()
+            .expect("a mesh");
+            for cut in cuts(whole.bounds().centre()) {
                 shapes.push(shape(&format!("{kind}\n{place}\n{cut}\nfaces = 1500")));
             }
         }
@@ -84,8 +90,7 @@ fn assert_exactly_convex(mesh: &TriMesh) {
 
 fn random_lines(bounds: Bounds, count: usize, seed: u64) -> Vec<Line> {
     let mut rng = Pcg64::seed_from_u64(seed);
-    let mut point =
-        |rng: &mut Pcg64| bounds.min + bounds.size() * DVec3::new(unit(rng), unit(rng), unit(rng));
+    let point = |rng: &mut Pcg64| bounds.min + bounds.size() * DVec3::new(unit(rng), unit(rng), unit(rng));
     (0..count)
         .filter_map(|_| {
             let (a, b) = (point(&mut rng), point(&mut rng));

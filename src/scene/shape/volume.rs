@@ -42,9 +42,10 @@ pub(super) fn cut_piece_volume(piece: &Piece, cuts: &[Cut]) -> f64 {
         let start = low + width * f64::from(i);
         (start, if i + 1 == PANELS { high } else { start + width })
     });
-    let rough: f64 = panels.clone().map(|(a, b)| gauss_kronrod(&area, a, b).0).sum();
-    let tolerance = RELATIVE_TOLERANCE * rough.max(f64::MIN_POSITIVE);
-    panels.map(|(a, b)| integrate(&area, a, b, tolerance, MAX_BISECTIONS)).sum()
+    let uncut = |z: f64| slice_area(&quadric, &[], z);
+    let whole: f64 = panels.clone().map(|(a, b)| gauss_kronrod(&uncut, a, b).0).sum();
+    let tolerance = RELATIVE_TOLERANCE * whole;
+    panels.map(|(a, b)| integrate(&area, a, b, tolerance, MAX_BISECTIONS)).sum::<f64>().max(0.0)
 }
 
 /// The area of the slice at height `z`, mm².

@@ -1,0 +1,259 @@
+//! The program as a user meets it: commands, files, exit codes.
+
+mod common;
+
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use common::{MetaImage, nested_balls};
+
+fn chordfield(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_chordfield"))
+        .current_dir(folder)
+        .args(args)
+        .stdin(Stdio::null())
+        .output()
+        .expect("the program starts")
+}
+
+fn out(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+fn err(output: &Output) -> String {
+    // Messages are wrapped to the width of a page.
+    let text = String::from_utf8_lossy(&output.stderr).replace(['|', '\n'], " ");
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// A folder with the scene `balls.toml`, 64 × 64 pixels.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("balls.toml"), nested_balls(64)).expect("a scene");
+    folder
+}
+
+fn files(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = std::fs::read_dir(folder)
+        .map(|entries| {
+            entries.map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned()).collect()
+        })
+        .unwrap_or_default();
+    names.sort();
+    names
+}
+
+#[test]
+fn projecting_writes_pictures_data_and_a_record_and_is_silent_when_piped() {
+    let folder = folder();
+    let run = chordfield(folder.path(), &["project", "balls.toml", "--gantry", "0,90", "--npy"]);
+    assert_eq!((run.status.code(), out(&run).as_str(), err(&run).as_str()), (Some(0), "", ""));
+    let written = files(&folder.path().join("out"));
+    for view in ["g000", "g090"] {
+        for product in [
+            "radiograph.png",
+            "colour.png",
+            "transmission.mha",
+            "transmission.npy",
+            "p.mha",
+            "p.npy",
+            "lengths",
+        ] {
+            assert!(written.contains(&format!("balls-{view}-{product}")), "{product} is not in {written:?}");
+        }
+    }
+    assert_eq!(
+        files(&folder.path().join("out/balls-g090-lengths")),
+        ["inner.mha", "inner.npy", "outer.mha", "outer.npy"]
+    );
+
+    let record = std::fs::read(folder.path().join("out/balls.json")).expect("a record");
+    let record: serde_json::Value = serde_json::from_slice(&record).expect("JSON");
+    assert_eq!(record["frames"]["lengths"], "mm");
+    assert_eq!(record["scene"]["organs"][1]["inside"], "outer");
+    assert_eq!(record["summary"]["rays"], 2 * 64 * 64);
+    for view in record["views"].as_array().expect("views") {
+        for file in view["files"].as_array().expect("files") {
+            let path = folder.path().join("out").join(file["file"].as_str().expect("a name"));
+            let bytes = std::fs::metadata(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())).len();
+            assert_eq!(file["bytes"], bytes);
+        }
+    }
+}
+
+#[test]
+fn images_read_back_with_spacing_place_and_direction() {
+    let folder = folder();
+    let run = chordfield(folder.path(), &["project", "balls.toml", "--gantry", "90", "--npy"]);
+    assert_eq!(run.status.code(), Some(0), "{}", err(&run));
+    let path = |name: &str| folder.path().join("out").join(name);
+    let image = MetaImage::read(&path("balls-g090-lengths/outer.mha"));
+    assert_eq!(image.numbers("DimSize"), [64.0, 64.0, 1.0]);
+    assert_eq!(image.numbers("ElementSpacing")[..2], [1.875, 1.875]);
+    // From the patient's left: columns run to the back, rows down to the feet, the detector lies to the right.
+    assert_eq!(image.numbers("TransformMatrix")[..6], [0.0, 1.0, 0.0, 0.0, 0.0, -1.0]);
+    assert_eq!(image.numbers("Offset"), [-500.0, -59.0625, 59.0625]);
+    assert_eq!(image.text("ElementType"), "MET_FLOAT");
+    assert_eq!(image.values.len(), 64 * 64);
+
+    let npy = std::fs::read(path("balls-g090-lengths/outer.npy")).expect("an array");
+    let data: Vec<f32> = npy[npy.len() - 4 * 64 * 64..]
+        .chunks_exact(4)
+        .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+        .collect();
+    assert_eq!(data, image.values);
+
+    let png = image::open(path("balls-g090-radiograph.png")).expect("a PNG");
+    let image::DynamicImage::ImageLuma16(grey) = png else { panic!("not 16-bit grey") };
+    let p = MetaImage::read(&path("balls-g090-p.mha")).values;
+    let brightest = grey.pixels().enumerate().max_by_key(|(_, pixel)| pixel.0).expect("pixels").0;
+    let highest = p.iter().copied().fold(0.0, f32::max);
+    assert!(p[brightest] > 0.95 * highest, "white is where p is high");
+    assert_eq!(grey.get_pixel(0, 0).0, [0], "air is black");
+}
+
+#[test]
+fn json_goes_to_standard_output_and_nothing_else_does() {
+    let folder = folder();
+    let run =
+        chordfield(folder.path(), &["project", "balls.toml", "--json", "--write", "p", "--threads", "1"]);
+    let summary: serde_json::Value = serde_json::from_slice(&run.stdout).expect("only JSON");
+    assert_eq!((&summary["method"], &summary["threads"]), (&"exact".into(), &1.into()));
+    let count = |key: &str| summary[key].as_u64().unwrap_or_else(|| panic!("no {key}"));
+    assert_eq!(
+        count("organ_rays"),
+        count("organ_rays_exact")
+            + count("organ_rays_skipped_by_bounds")
+            + count("organ_rays_skipped_unneeded")
+    );
+    assert!(summary["seconds"]["project"].as_f64().is_some());
+    assert_eq!(files(&folder.path().join("out")), ["balls-g000-p.mha", "balls.json"]);
+}
+
+#[test]
+fn float_images_are_the_same_bytes_for_one_two_and_eight_threads() {
+    let folder = folder();
+    let project = |threads: &str| {
+        let args = [
+            "project",
+            "balls.toml",
+            "--threads",
+            threads,
+            "-o",
+            threads,
+            "--photons",
+            "5000",
+            "--seed",
+            "3",
+        ];
+        assert_eq!(chordfield(folder.path(), &args).status.code(), Some(0));
+        let folder = folder.path().join(threads);
+        [
+            "balls-g000-p.mha",
+            "balls-g000-colour.png",
+            "balls-g000-radiograph.png",
+            "balls-g000-lengths/inner.mha",
+        ]
+        .map(|file| std::fs::read(folder.join(file)).expect(file))
+    };
+    let one = project("1");
+    assert!(one == project("2") && one == project("8"));
+}
+
+#[test]
+fn bad_input_exits_2_with_the_place_and_leaves_nothing() {
+    let folder = folder();
+    let broken = nested_balls(64).replace("[10, 5, -8]", "[45, 0, 0]");
+    std::fs::write(folder.path().join("crossing.toml"), broken).expect("a scene");
+    let run = chordfield(folder.path(), &["project", "crossing.toml"]);
+    assert_eq!((run.status.code(), out(&run).as_str()), (Some(2), ""));
+    assert!(err(&run).contains("organs `outer` and `inner` cross"), "{}", err(&run));
+    assert!(err(&run).contains("crossing.toml:15"), "{}", err(&run));
+    assert!(!folder.path().join("out").exists());
+
+    for (args, words) in [
+        (&["project", "nobody"][..], "no phantom of that name"),
+        (&["project", "missing.toml"], "cannot read missing.toml"),
+        (&["project", "balls.toml", "--gantry", "0..360"], "--gantry"),
+        (&["project", "balls.toml", "--energy-kev", "5"], "5"),
+        (&["project", "balls.toml", "--size", "0x64"], "pixels"),
+        (&["project", "balls.toml", "--photons", "-1"], "photon"),
+        (&["phantom", "show", "nobody"], "nobody"),
+    ] {
+        let run = chordfield(folder.path(), args);
+        assert_eq!(run.status.code(), Some(2), "{args:?}");
+        assert!(err(&run).contains(words), "{args:?}: {}", err(&run));
+    }
+    assert!(!folder.path().join("out").exists());
+}
+
+#[test]
+fn a_file_in_the_way_of_the_output_folder_is_named() {
+    let folder = folder();
+    std::fs::write(folder.path().join("out"), "mine").expect("a file");
+    let run = chordfield(folder.path(), &["project", "balls.toml"]);
+    assert_eq!(run.status.code(), Some(2));
+    assert!(err(&run).contains("cannot create out"), "{}", err(&run));
+    assert_eq!(std::fs::read_to_string(folder.path().join("out")).expect("still there"), "mine");
+}
+
+#[test]
+fn check_tells_ready_from_refused() {
+    let folder = folder();
+    let tetrahedron = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    std::fs::write(folder.path().join("good.obj"), tetrahedron).expect("a mesh");
+    std::fs::write(folder.path().join("open.obj"), tetrahedron.replace("f 2 3 4\n", "")).expect("a mesh");
+
+    let good = chordfield(folder.path(), &["check", "good.obj", "balls.toml"]);
+    assert_eq!(good.status.code(), Some(0));
+    assert!(out(&good).contains("good.obj: ready") && out(&good).contains("convex"), "{}", out(&good));
+    assert!(out(&good).contains("2 organs that do not cross"), "{}", out(&good));
+
+    let bad = chordfield(folder.path(), &["check", "open.obj", "--json"]);
+    assert_eq!(bad.status.code(), Some(2));
+    let findings: serde_json::Value = serde_json::from_slice(&bad.stdout).expect("JSON");
+    assert_eq!(findings[0]["usable"], false);
+    let problem = &findings[0]["problems"][0];
+    assert!(problem["problem"].as_str().expect("words").contains("3 edges have a face on one side only"));
+    assert!(problem["remedy"].as_str().expect("words").contains("close the holes"));
+}
+
+#[test]
+fn a_closed_pipe_ends_quietly() {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_chordfield"))
+        .args(["completions", "bash"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    drop(child.stdout.take());
+    let run = child.wait_with_output().expect("it ends");
+    assert_eq!((run.status.code(), err(&run).as_str()), (Some(0), ""));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interrupt_exits_130_and_leaves_no_partial_file() {
+    let folder = folder();
+    let child = Command::new(env!("CARGO_BIN_EXE_chordfield"))
+        .current_dir(folder.path())
+        .args(["project", "balls.toml", "--gantry", "0..360:1", "--size", "4000x4000", "--threads", "1"])
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let folder_of_output = folder.path().join("out");
+    // The folder appears when work begins; by then the signal is handled.
+    for _ in 0..500 {
+        if folder_of_output.exists() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
+    assert!(killed.success());
+    let run = child.wait_with_output().expect("it ends");
+    assert_eq!(run.status.code(), Some(130), "{}", err(&run));
+    assert!(err(&run).contains("interrupted"), "{}", err(&run));
+    let left = files(&folder_of_output);
+    assert!(!left.iter().any(|f| f == "balls.json" || f.starts_with(".tmp")), "{left:?}");
+}
