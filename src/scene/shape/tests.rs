@@ -90,8 +90,7 @@ fn assert_exactly_convex(mesh: &TriMesh) {
 
 fn random_lines(bounds: Bounds, count: usize, seed: u64) -> Vec<Line> {
     let mut rng = Pcg64::seed_from_u64(seed);
-    let mut point =
-        |rng: &mut Pcg64| bounds.min + bounds.size() * DVec3::new(unit(rng), unit(rng), unit(rng));
+    let point = |rng: &mut Pcg64| bounds.min + bounds.size() * DVec3::new(unit(rng), unit(rng), unit(rng));
     (0..count)
         .filter_map(|_| {
             let (a, b) = (point(&mut rng), point(&mut rng));
