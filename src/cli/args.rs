@@ -107,10 +107,10 @@ pub struct BeamArgs {
     #[arg(long, value_enum)]
     pub beam: Option<BeamKindArg>,
     /// Source to isocentre, mm.
-    #[arg(long = "sad-mm", value_name = "MM")]
+    #[arg(long = "sad-mm", value_name = "MM", allow_negative_numbers = true)]
     pub sad_mm: Option<f64>,
     /// Source to detector, mm.
-    #[arg(long = "sdd-mm", value_name = "MM")]
+    #[arg(long = "sdd-mm", value_name = "MM", allow_negative_numbers = true)]
     pub sdd_mm: Option<f64>,
     /// The isocentre, patient LPS, mm.
     #[arg(long = "isocentre-mm", value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
@@ -131,7 +131,7 @@ pub struct BeamArgs {
 #[command(next_help_heading = "Photons (in place of the scene's)")]
 pub struct PhotonArgs {
     /// One energy, keV.
-    #[arg(long = "energy-kev", value_name = "KEV", conflicts_with = "kvp")]
+    #[arg(long = "energy-kev", value_name = "KEV", allow_negative_numbers = true, conflicts_with = "kvp")]
     pub energy_kev: Option<f64>,
     /// A tungsten tube at 60, 80, 100, 120 or 140 kV.
     #[arg(long, value_name = "KV")]
@@ -140,7 +140,7 @@ pub struct PhotonArgs {
     #[arg(long, value_enum)]
     pub response: Option<ResponseArg>,
     /// Photons that would reach each pixel through air; turns Poisson noise on.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub photons: Option<f64>,
     /// The seed of the noise.
     #[arg(long, default_value_t = 0, requires = "photons")]

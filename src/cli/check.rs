@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::io::Write;
 use std::path::Path;
 
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::args::CheckArgs;
@@ -13,6 +14,8 @@ use crate::exact::Body;
 use crate::output::sidecar::OrganRecord;
 use crate::scene::Scene;
 use crate::scene::body::{self, Proved};
+use crate::scene::organ::{Organ, Origin};
+use crate::scene::shape::Shape;
 
 /// Checks each file and says what it found; [`Outcome::Refused`] if any cannot be used.
 pub fn run(args: &CheckArgs, out: &mut dyn Write) -> Result<Outcome> {
@@ -39,9 +42,22 @@ struct Finding {
 #[derive(Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Content {
-    Scene { organs: Vec<OrganRecord> },
+    Scene { organs: Vec<OrganFinding> },
     Surface(SurfaceRecord),
     Problems(Vec<Problem>),
+}
+
+/// An organ, and how far its mesh is from the shape it stands for.
+#[derive(Debug, Serialize)]
+struct OrganFinding {
+    #[serde(flatten)]
+    organ: OrganRecord,
+    /// How deep the mesh lies under the true surface at worst, mm; none for organs from mesh files.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tessellation_depth_mm: Option<f64>,
+    /// The volume of the true body, mm³; none for organs from mesh files.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    true_volume_mm3: Option<f64>,
 }
 
 #[derive(Debug, Serialize)]
@@ -87,7 +103,21 @@ impl Finding {
 }
 
 fn scene_content(scene: Scene) -> Content {
-    Content::Scene { organs: scene.organs.iter().map(|o| OrganRecord::of(o, &scene.organs)).collect() }
+    Content::Scene { organs: scene.organs.par_iter().map(|o| organ_finding(o, &scene.organs)).collect() }
+}
+
+fn organ_finding(organ: &Organ, organs: &[Organ]) -> OrganFinding {
+    let shapes = match &organ.origin {
+        Origin::Shapes(shapes) => &shapes[..],
+        Origin::Mesh { .. } => &[],
+    };
+    // The scene was built from these shapes, so they can be tessellated.
+    let depths = shapes.iter().filter_map(|s| s.tessellation_depth_mm().ok());
+    OrganFinding {
+        organ: OrganRecord::of(organ, organs),
+        tessellation_depth_mm: depths.reduce(f64::max),
+        true_volume_mm3: (!shapes.is_empty()).then(|| shapes.iter().map(Shape::volume_mm3).sum()),
+    }
 }
 
 fn surface_content(path: &Path) -> Result<Content> {
@@ -126,19 +156,21 @@ fn problems(error: Error) -> Vec<Problem> {
     }
 }
 
-fn write_scene(text: &mut String, file: &str, organs: &[OrganRecord]) -> std::fmt::Result {
+fn write_scene(text: &mut String, file: &str, organs: &[OrganFinding]) -> std::fmt::Result {
     writeln!(text, "{file}: ready, {} organs that do not cross", organs.len())?;
-    let width = organs.iter().map(|o| o.name.chars().count() + 2 * o.depth).max().unwrap_or(0);
-    for organ in organs {
+    let width = organs.iter().map(|f| f.organ.name.chars().count() + 2 * f.organ.depth).max().unwrap_or(0);
+    for finding in organs {
+        let organ = &finding.organ;
         let name = format!("{}{}", "  ".repeat(organ.depth), organ.name);
         let form = if organ.convex { "convex" } else { "not convex" };
+        let depth = match finding.tessellation_depth_mm {
+            Some(0.0) => ", exact".into(),
+            Some(depth) => format!(", up to {depth:.3} mm under the true surface"),
+            None => String::new(),
+        };
         let inside = organ.inside.as_ref().map(|p| format!(", inside {p}")).unwrap_or_default();
-        writeln!(
-            text,
-            "  {name:width$}  {:>10.2} mL  {:>6} faces  {form}{inside}",
-            organ.volume_mm3 / 1e3,
-            organ.faces
-        )?;
+        let (volume, faces) = (organ.volume_mm3 / 1e3, organ.faces);
+        writeln!(text, "  {name:width$}  {volume:>10.2} mL  {faces:>6} faces{depth}, {form}{inside}")?;
         for notice in &organ.notices {
             writeln!(text, "  {:width$}  notice: {notice}", "")?;
         }

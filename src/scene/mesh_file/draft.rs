@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 use std::path::Path;
+use std::rc::Rc;
 
 use glam::DVec3;
 
@@ -15,6 +16,9 @@ const LARGEST_COORDINATE: f64 = 1e15;
 
 /// Names listed in an error, at most.
 const MOST_NAMES_LISTED: usize = 24;
+
+/// Names that many sections may share: a file can repeat the use of a name far more often than its letters.
+pub(super) type NameList = Rc<[String]>;
 
 /// A mesh being read from a file.
 pub(super) struct Draft<'a> {
@@ -31,8 +35,15 @@ pub(super) struct Draft<'a> {
 
 /// A run of faces under the same names; it ends where the next one begins.
 struct Section {
-    names: Vec<String>,
+    names: Vec<NameList>,
     first_face: usize,
+}
+
+impl Section {
+    /// Its names, empty ones left out.
+    fn names(&self) -> impl Iterator<Item = &String> {
+        self.names.iter().flat_map(|list| list.iter()).filter(|name| !name.is_empty())
+    }
 }
 
 impl<'a> Draft<'a> {
@@ -82,13 +93,20 @@ impl<'a> Draft<'a> {
         self.shares_vertices = false;
     }
 
-    /// The faces that follow stand under these names.
-    pub fn begin_section(&mut self, names: Vec<String>) {
+    /// The faces that follow stand under all names of these lists; empty names are none.
+    pub fn begin_section(&mut self, names: Vec<NameList>) {
         self.sections.push(Section { names, first_face: self.faces.len() });
     }
 
-    /// Adds a vertex. An error if a coordinate is not finite or absurdly large.
+    /// Adds a vertex. Errors as of [`check_position`](Self::check_position).
     pub fn add_vertex(&mut self, position: DVec3, place: impl Display) -> Result<()> {
+        self.check_position(position, place)?;
+        self.vertices.push(position);
+        Ok(())
+    }
+
+    /// An error if a coordinate is not finite or absurdly large.
+    pub fn check_position(&self, position: DVec3, place: impl Display) -> Result<()> {
         if !position.is_finite() {
             return Err(self.refuse_at(
                 place,
@@ -103,20 +121,25 @@ impl<'a> Draft<'a> {
                 "check the unit of the export; the file may also be damaged",
             ));
         }
-        self.vertices.push(position);
         Ok(())
+    }
+
+    /// An error if a face has too few corners.
+    pub fn check_corners(&self, count: usize, place: impl Display) -> Result<()> {
+        if count >= 3 {
+            return Ok(());
+        }
+        Err(self.refuse_at(
+            place,
+            format!("the face has {count} of the three corners it needs"),
+            "delete the face or give it its missing corners",
+        ))
     }
 
     /// Adds a polygon over known vertices, as triangles. An error if it has fewer than three corners or the
     /// file too many triangles.
     pub fn add_polygon(&mut self, corners: &[u32], place: impl Display) -> Result<()> {
-        if corners.len() < 3 {
-            return Err(self.refuse_at(
-                place,
-                format!("the face has {} of the three corners it needs", corners.len()),
-                "delete the face or give it its missing corners",
-            ));
-        }
+        self.check_corners(corners.len(), &place)?;
         self.expect_faces(corners.len() - 2)?;
         if let &[a, b, c] = corners {
             self.faces.push([a, b, c]);
@@ -196,7 +219,7 @@ impl<'a> Draft<'a> {
         let mut names = Vec::new();
         for (section, faces) in self.sections_with_faces() {
             if !faces.is_empty() {
-                names.extend(section.names.iter().filter(|&name| seen.insert(name)).cloned());
+                names.extend(section.names().filter(|&name| seen.insert(name)).cloned());
             }
         }
         names
@@ -220,7 +243,7 @@ impl<'a> Draft<'a> {
         }
         let kept = self
             .sections_with_faces()
-            .filter(|(section, _)| section.names.iter().any(|name| chosen.contains(name)))
+            .filter(|(section, _)| section.names().any(|name| chosen.contains(name)))
             .flat_map(|(_, faces)| &self.faces[faces])
             .copied()
             .collect();

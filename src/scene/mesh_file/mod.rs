@@ -6,6 +6,9 @@
 //!           face named in errors)      o, g, solid)     vertices)
 //! ```
 //!
+//! The formats are read by the crates `tobj`, `stl_io` and `ply-rs-bw`; what each of them leaves unchecked is
+//! checked around it, and text STL is read here, because `stl_io` knows it in f32 only.
+//!
 //! Nothing is proved about the surface here: closed, consistently outward and free of crossings is what the
 //! geometry checks say. What is proved: the numbers are finite, every face has three distinct vertices that
 //! exist, and equal positions are one vertex. Other files that a mesh file names (materials, textures) are

@@ -8,9 +8,18 @@
 //! A binary file may begin with the word `solid`, so the size decides: a file of exactly 84 + 50 n bytes is
 //! binary. (In a text, the four bytes of n are printable and would announce 27 GB.) The stored normals are
 //! ignored: the order of the corners says what is outside. A text may hold several solids.
+//!
+//! The triangles of a binary file are those that the crate `stl_io` reads. A text it cannot serve: it reads
+//! coordinates as f32, so that 0.1 becomes 0.100000001490116 while the same mesh in OBJ or PLY is exact to 1e-17;
+//! no preparation of the text can undo that. (It also ends at the first `endsolid`, names no lines, and refuses
+//! facets whose normal is `nan` and keywords in capitals, which exporters write.) Texts are therefore read here.
+//!
 //! Source: 3D Systems, *Stereolithography Interface Specification*, 1989.
 
-use glam::DVec3;
+use std::io::{Cursor, Read, Seek, SeekFrom};
+use std::rc::Rc;
+
+use glam::{DVec3, Vec3};
 
 use super::draft::Draft;
 use super::numbered_lines;
@@ -18,7 +27,8 @@ use crate::Result;
 
 const HEADER_BYTES: usize = 84;
 const TRIANGLE_BYTES: usize = 50;
-const NORMAL_BYTES: usize = 12;
+/// The free text at the start of a binary header.
+const NAME_BYTES: u64 = 80;
 /// In the first kilobyte, a binary file has a zero byte: in its header, in n, or in a normal or an attribute.
 const TEXT_SAMPLE_BYTES: usize = 1024;
 
@@ -83,18 +93,38 @@ fn read_binary(bytes: &[u8], draft: &mut Draft) -> Result<()> {
     if needed < size {
         draft.notice(format!("{} bytes after the last triangle were ignored", size - needed));
     }
-    let records = bytes[HEADER_BYTES..].chunks_exact(TRIANGLE_BYTES).take(triangles as usize);
-    for (i, record) in records.enumerate() {
+    // The sizes were compared above, so `stl_io` meets no end of file; it also reserves no memory by the header.
+    let damaged = |error: std::io::Error| draft.refuse(format!("it cannot be read: {error}"), EXPORT_AGAIN);
+    let mut unnamed = Unnamed(Cursor::new(bytes));
+    let found = stl_io::create_stl_reader(&mut unnamed).map_err(damaged)?;
+    for (i, triangle) in found.enumerate() {
         let place = BinaryPlace { triangle: i + 1, triangles };
-        let numbers: [f64; 9] = std::array::from_fn(|k| {
-            let at = NORMAL_BYTES + 4 * k;
-            let number = [record[at], record[at + 1], record[at + 2], record[at + 3]];
-            f64::from(f32::from_le_bytes(number))
-        });
-        let [a, b, c] = [0, 3, 6].map(|k| DVec3::from_slice(&numbers[k..k + 3]));
-        add_triangle([a, b, c], place, draft)?;
+        let corners = triangle
+            .map_err(|error| draft.refuse_at(place, format!("it cannot be read: {error}"), EXPORT_AGAIN))?
+            .vertices;
+        add_triangle(corners.map(|corner| Vec3::from_array(corner.0).as_dvec3()), place, draft)?;
     }
     Ok(())
+}
+
+/// A binary file with line ends in place of the name in its header. `stl_io` offers no way to say that a file
+/// is binary, and takes one whose name begins with “solid ” for a text; nor does it search far for the end of
+/// the first line.
+struct Unnamed<'a>(Cursor<&'a [u8]>);
+
+impl Read for Unnamed<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let name_left = NAME_BYTES.saturating_sub(self.0.position()) as usize;
+        let count = self.0.read(buffer)?;
+        buffer[..count.min(name_left)].fill(b'\n');
+        Ok(count)
+    }
+}
+
+impl Seek for Unnamed<'_> {
+    fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+        self.0.seek(to)
+    }
 }
 
 /// A triangle's place in a binary file.
@@ -129,7 +159,7 @@ fn read_text(bytes: &[u8], draft: &mut Draft) -> Result<()> {
         match (keyword.to_ascii_lowercase().as_str(), &mut open_facet) {
             ("solid", None) => {
                 let name = text.trim()[keyword.len()..].trim();
-                draft.begin_section(if name.is_empty() { vec![] } else { vec![name.to_owned()] });
+                draft.begin_section(vec![Rc::new([name.to_owned()])]);
                 solids += 1;
                 open_solid = true;
             }

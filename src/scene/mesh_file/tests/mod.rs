@@ -239,6 +239,7 @@ fn damaged_bytes_never_panic_and_never_give_a_wrong_index() {
     let mut files: Vec<(&str, Vec<u8>)> =
         PLY_KINDS.iter().map(|&kind| ("d.ply", ply_file(kind, &vertices, &polygons))).collect();
     files.push(("d.obj", TETRAHEDRON.as_bytes().to_vec()));
+    files.push(("d.obj", format!("o a\n{TETRAHEDRON}g b c\nf 1 \\\n-1 2 3\nusemtl m\nl 1 2\n").into_bytes()));
     files.push(("d.stl", binary_stl(b"solid", 2, &[TRIANGLE, TRIANGLE])));
     let damage = prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4);
     let cases = (prop::sample::select(files), damage, any::<prop::sample::Index>(), any::<bool>());

@@ -136,16 +136,74 @@ fn files_without_faces_are_refused() {
 }
 
 #[test]
-fn tobj_reads_the_same_triangles() {
+fn texture_coordinates_and_objects_leave_the_triangles_as_they_are() {
     let text =
         TETRAHEDRON.replace("f 1 3 2", "vt 0 0\nvt 1 0\no a\nf 1/1 3/2 2/1").replace("f 2", "o b\nf 2");
-    let options = tobj::LoadOptions { triangulate: true, ..tobj::LoadOptions::default() };
-    let (models, _) =
-        tobj::load_obj_buf(&mut text.as_bytes(), &options, |_| Ok(Default::default())).expect("a mesh");
-    let theirs: Vec<DVec3> = models
-        .iter()
-        .flat_map(|m| m.mesh.indices.iter().map(|&i| DVec3::from_slice(&m.mesh.positions[3 * i as usize..])))
-        .collect();
-    let ours: Vec<DVec3> = read_well("t.obj", text).mesh.triangles().flatten().collect();
-    assert_eq!(ours, theirs);
+    let [o, x, y, z] = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+    let triangles: Vec<[DVec3; 3]> = read_well("t.obj", text).mesh.triangles().collect();
+    assert_eq!(triangles, [[o, y, x], [o, x, z], [o, z, y], [x, y, z]]);
+}
+
+#[test]
+fn vertices_shared_between_groups_stay_shared() {
+    let text = TETRAHEDRON.replace("f 1 3 2", "o a\nf 1 3 2").replace("f 1 4 3", "g b\nf 1 4 3");
+    let file = read_well("t.obj", &text);
+    assert_eq!(file.mesh, read_well("t.obj", TETRAHEDRON).mesh);
+    assert_eq!(file.notices.len(), 0, "{:?}", file.notices);
+
+    let options = ReadOptions { groups: Some(vec!["b".into()]), ..ReadOptions::default() };
+    let part = read_as("t.obj", &text, &options).expect("a mesh").mesh;
+    assert_eq!(part.vertices, [DVec3::ZERO, DVec3::Z, DVec3::Y, DVec3::X]);
+    assert_eq!(part.faces, [[0, 1, 2], [3, 2, 1]]);
+}
+
+#[test]
+fn triangles_and_polygons_may_be_mixed_in_any_order() {
+    let text =
+        "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 1 3 0\nf 1 2 3 4\ng roof\nf 4 3 5\nf 1 2 3 5 4\nf 1 2 4\n";
+    let file = read_well("m.obj", text);
+    assert_eq!(file.mesh.faces.len(), 2 + 1 + 3 + 1);
+    assert_eq!(file.mesh.area(), 4.0 + 1.0 + 5.0 + 2.0);
+    assert_eq!(file.notices, ["2 polygons were split into triangles"]);
+    let options = ReadOptions { groups: Some(vec!["roof".into()]), ..ReadOptions::default() };
+    assert_eq!(read_as("m.obj", text, &options).expect("a mesh").mesh.area(), 8.0);
+}
+
+#[test]
+fn a_material_without_a_name_is_no_error() {
+    for line in ["usemtl", "usemtl ", "mtllib", "usemtl\t"] {
+        let text = TETRAHEDRON.replace("f 1 4 3", &format!("{line}\nf 1 4 3"));
+        assert_eq!(read_well("t.obj", text), read_well("t.obj", TETRAHEDRON), "{line}");
+    }
+}
+
+/// Whoever opens a pipe without a writer waits for one.
+#[cfg(unix)]
+#[test]
+fn a_material_library_of_absolute_path_is_never_opened() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let pipe = folder.path().join("skin.mtl");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status().expect("mkfifo runs");
+    assert!(made.success());
+    let text = format!("mtllib {}\nusemtl skin\n{TETRAHEDRON}", pipe.display());
+    let (done, wait) = std::sync::mpsc::channel();
+    std::thread::spawn(move || done.send(read_well("t.obj", text).mesh.faces.len()));
+    assert_eq!(wait.recv_timeout(std::time::Duration::from_secs(20)), Ok(4));
+}
+
+#[test]
+fn names_that_no_person_wrote_are_refused_with_their_line() {
+    let long = "x".repeat(2000);
+    assert_says(
+        &refusal("n.obj", format!("{TETRAHEDRON}g {long}\nf 1 2 3\n")),
+        &["line 9", "2000 bytes", "xxx…", "at most 1024"],
+    );
+}
+
+#[test]
+fn a_file_of_more_triangles_than_the_limit_is_refused() {
+    let limit = |max_faces| ReadOptions { max_faces, ..ReadOptions::default() };
+    let quadrilateral = TETRAHEDRON.replace("f 2 3 4", "f 1 2 3 4");
+    assert!(read_as("t.obj", &quadrilateral, &limit(5)).is_ok());
+    assert_says(&refusal_with("t.obj", &quadrilateral, &limit(4)), &["limit of 4 triangles"]);
 }

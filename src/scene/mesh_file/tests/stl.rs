@@ -15,11 +15,31 @@ fn text_and_binary_give_the_same_mesh() {
 
 #[test]
 fn a_binary_file_that_begins_with_solid_is_binary() {
-    for header in [&b"solid torus"[..], b"solid x\n"] {
-        let mut header = header.to_vec();
+    let second = TRIANGLE.map(|[x, y, z]| [x - 3.5, y, z + 0.1]);
+    let expected = read_well("s.stl", binary_stl(b"", 2, &[TRIANGLE, second])).mesh;
+    assert_eq!(expected.vertices[3], DVec3::new(-3.5, 0.0, f64::from(0.1f32)));
+    for name in [&b"solid torus"[..], b"solid x\n", b"solid ", b"SOLID\r\nfacet normal 0 0 1"] {
+        let mut header = name.to_vec();
         header.resize(80, b' ');
-        assert_eq!(read_well("s.stl", binary_stl(&header, 1, &[TRIANGLE])).mesh.faces.len(), 1);
+        let file = read_well("s.stl", binary_stl(&header, 2, &[TRIANGLE, second]));
+        assert_eq!((file.mesh, file.groups.len()), (expected.clone(), 0));
     }
+}
+
+#[test]
+fn a_text_keeps_the_digits_that_f32_would_lose() {
+    let file = read_well("d.stl", TEXT.replace("vertex 0 0 0", "vertex 0.1 -1133.590001 1e-50"));
+    assert_eq!(file.mesh.vertices[0], DVec3::new(0.1, -1133.590001, 1e-50));
+}
+
+#[test]
+fn stl_io_reads_the_same_text_up_to_its_f32() {
+    let text = TEXT.to_lowercase().replace("nan", "1").replace("vertex 0 0 0", "vertex 0.1 -7.7 1e-5");
+    let theirs = stl_io::read_stl(&mut std::io::Cursor::new(&text)).expect("a mesh");
+    let ours = read_well("t.stl", &text).mesh;
+    let narrow: Vec<[f32; 3]> = ours.vertices.iter().map(|v| v.as_vec3().to_array()).collect();
+    assert_eq!(narrow, theirs.vertices.iter().map(|v| v.0).collect::<Vec<_>>());
+    assert_eq!(theirs.faces[0].vertices, [0, 1, 2]);
 }
 
 #[test]
@@ -32,6 +52,9 @@ fn every_solid_of_a_text_is_read_and_can_be_chosen() {
     let options = ReadOptions { groups: Some(vec!["right kidney".into()]), ..ReadOptions::default() };
     let right = read_as("k.stl", &two, &options).expect("a mesh").mesh;
     assert_eq!(right.vertices[0].z, 9.0);
+
+    let nameless = two.replace(" left kidney", "").replace(" right kidney", "").replace('\n', "\r\n");
+    assert_eq!(read_well("k.stl", nameless).mesh, both.mesh);
 }
 
 #[test]
