@@ -2,81 +2,63 @@
 
 use std::io::{self, Write};
 
+use ::image::{ImageBuffer, Luma, Pixel};
+pub use ::image::{RgbImage, RgbaImage};
 use glam::DVec3;
 
 use crate::{Error, Result};
 
-/// Pixels in rows, the first row at the top.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Image<T> {
+/// An image of single-precision numbers, the first row at the top: a transmission, a projection value p, a length
+/// in mm.
+pub type FloatImage = ImageBuffer<Luma<f32>, Vec<f32>>;
+
+/// The image of `columns` × `rows` pixels whose samples are given pixel after pixel, row after row from the top.
+///
+/// # Errors
+/// If a side is 0 or beyond 2³¹ − 1 (what PNG can say), or if there are not `columns · rows` pixels. (The buffer's
+/// own constructor takes sides of 0 and drops surplus samples unseen.)
+pub fn image_of<P: Pixel>(
     columns: usize,
     rows: usize,
-    pixels: Vec<T>,
+    samples: Vec<P::Subpixel>,
+) -> Result<ImageBuffer<P, Vec<P::Subpixel>>> {
+    const LONGEST_SIDE: usize = i32::MAX as usize;
+    let channels = usize::from(P::CHANNEL_COUNT);
+    let given = samples.len();
+    let refused = || {
+        Error::input(
+            "image",
+            format!("{given} samples do not make {columns} columns of {rows} rows of {channels} per pixel"),
+            "give both sides from 1 to 2147483647 and the samples of every pixel",
+        )
+    };
+    let sides_fit = (1..=LONGEST_SIDE).contains(&columns) && (1..=LONGEST_SIDE).contains(&rows);
+    let needed = columns.checked_mul(rows).and_then(|pixels| pixels.checked_mul(channels));
+    if !sides_fit || needed != Some(given) {
+        return Err(refused());
+    }
+    // Sides below 2³¹ fit 32 bits.
+    ImageBuffer::from_raw(columns as u32, rows as u32, samples).ok_or_else(refused)
 }
 
-/// An image of single-precision numbers: a transmission, a projection value p, a length in mm.
-pub type FloatImage = Image<f32>;
-
-impl<T> Image<T> {
-    /// The image of `columns` × `rows` pixels, row after row.
-    ///
-    /// # Errors
-    /// If a side is 0 or beyond 2³¹ − 1 (what PNG can say), or if there are not `columns · rows` pixels.
-    pub fn new(columns: usize, rows: usize, pixels: Vec<T>) -> Result<Self> {
-        const LONGEST_SIDE: usize = i32::MAX as usize;
-        let sides_fit = (1..=LONGEST_SIDE).contains(&columns) && (1..=LONGEST_SIDE).contains(&rows);
-        if !sides_fit || columns.checked_mul(rows) != Some(pixels.len()) {
-            return Err(Error::input(
-                "image",
-                format!("{} pixels do not make {columns} columns of {rows} rows", pixels.len()),
-                "give both sides from 1 to 2147483647 and one value per pixel",
-            ));
-        }
-        Ok(Self { columns, rows, pixels })
-    }
-
-    /// Pixels in a row.
-    pub fn columns(&self) -> usize {
-        self.columns
-    }
-
-    /// Pixels in a column.
-    pub fn rows(&self) -> usize {
-        self.rows
-    }
-
-    /// All pixels, row after row from the top.
-    pub fn pixels(&self) -> &[T] {
-        &self.pixels
-    }
-
-    /// All pixels, to be changed in place.
-    pub fn pixels_mut(&mut self) -> &mut [T] {
-        &mut self.pixels
-    }
-
-    /// The pixel in a column and a row, both counted from 0. `None` outside the image.
-    pub fn get(&self, column: usize, row: usize) -> Option<&T> {
-        (column < self.columns).then(|| self.pixels.get(row * self.columns + column)).flatten()
-    }
-
-    /// The rows from the top, each a slice of `columns` pixels.
-    pub fn each_row(&self) -> impl ExactSizeIterator<Item = &[T]> {
-        self.pixels.chunks_exact(self.columns)
-    }
+/// The rows of an image from the top, each with the samples of its pixels.
+pub(super) fn sample_rows<P: Pixel>(
+    image: &ImageBuffer<P, Vec<P::Subpixel>>,
+) -> impl Iterator<Item = &[P::Subpixel]> {
+    // An image without columns has no samples; chunks of none would be refused.
+    let row_length = image.width() as usize * usize::from(P::CHANNEL_COUNT);
+    image.as_raw().chunks_exact(row_length.max(1)).take(image.height() as usize)
 }
 
-impl FloatImage {
-    /// Writes all pixels as little-endian 32-bit floats, row after row; one row at a time is copied.
-    pub(super) fn write_little_endian(&self, out: &mut dyn Write) -> io::Result<()> {
-        let mut bytes = Vec::with_capacity(4 * self.columns);
-        for row in self.each_row() {
-            bytes.clear();
-            bytes.extend(row.iter().flat_map(|value| value.to_le_bytes()));
-            out.write_all(&bytes)?;
-        }
-        Ok(())
+/// Writes all pixels as little-endian 32-bit floats, row after row; one row at a time is copied.
+pub(super) fn write_little_endian(image: &FloatImage, out: &mut dyn Write) -> io::Result<()> {
+    let mut bytes = Vec::with_capacity(4 * image.width() as usize);
+    for row in sample_rows(image) {
+        bytes.clear();
+        bytes.extend(row.iter().flat_map(|value| value.to_le_bytes()));
+        out.write_all(&bytes)?;
     }
+    Ok(())
 }
 
 /// Where an image's pixels are, in the patient frame (DICOM LPS: +x left, +y posterior, +z superior), mm.
@@ -148,19 +130,27 @@ mod tests {
 
     #[test]
     fn rows_are_counted_from_the_top_and_columns_from_the_left() {
-        let image = Image::new(3, 2, vec![0, 1, 2, 10, 11, 12]).expect("an image");
-        assert_eq!((image.columns(), image.rows()), (3, 2));
-        assert_eq!(image.get(2, 1), Some(&12));
-        assert_eq!((image.get(3, 0), image.get(0, 2)), (None, None));
-        assert_eq!(image.each_row().nth(1), Some(&[10, 11, 12][..]));
+        let image = image_of::<Luma<u8>>(3, 2, vec![0, 1, 2, 10, 11, 12]).expect("an image");
+        assert_eq!((image.width(), image.height()), (3, 2));
+        assert_eq!(image.get_pixel_checked(2, 1), Some(&Luma([12])));
+        assert_eq!((image.get_pixel_checked(3, 0), image.get_pixel_checked(0, 2)), (None, None));
+        assert_eq!(sample_rows(&image).nth(1), Some(&[10, 11, 12][..]));
+        let colours: RgbImage = image_of(1, 2, vec![1, 2, 3, 4, 5, 6]).expect("an image");
+        assert_eq!(sample_rows(&colours).collect::<Vec<_>>(), [[1, 2, 3], [4, 5, 6]]);
     }
 
     #[test]
     fn sizes_that_do_not_fit_the_pixels_are_refused() {
-        for (columns, rows) in [(0, 0), (3, 0), (2, 2), (usize::MAX, 2), (1 << 33, 1 << 31)] {
-            assert!(Image::new(columns, rows, vec![0u8; 3]).is_err(), "{columns}×{rows}");
+        for (columns, rows) in [(0, 0), (3, 0), (2, 2), (2, 1), (usize::MAX, 2), (1 << 33, 1 << 31)] {
+            assert!(image_of::<Luma<u8>>(columns, rows, vec![0u8; 3]).is_err(), "{columns}×{rows}");
         }
-        assert!(Image::<u8>::new(0, 5, vec![]).is_err());
+        assert!(image_of::<Luma<u8>>(0, 5, vec![]).is_err());
+        assert!(image_of::<::image::Rgb<u8>>(2, 1, vec![0; 5]).is_err());
+    }
+
+    #[test]
+    fn an_image_without_pixels_has_no_rows() {
+        assert_eq!(sample_rows(&FloatImage::new(0, 3)).count(), 0);
     }
 
     #[test]

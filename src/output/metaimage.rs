@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use super::atomic::write_atomically;
-use super::image::{FloatImage, Geometry};
+use super::image::{FloatImage, Geometry, write_little_endian};
 use crate::Result;
 
 /// MetaIO keeps a comment in 255 characters; a longer one would be cut by readers.
@@ -23,7 +23,7 @@ const LONGEST_COMMENT: usize = 200;
 pub fn write(path: &Path, image: &FloatImage, geometry: &Geometry, comment: &str) -> Result<u64> {
     write_atomically(path, |out| {
         write_header(out, image, geometry, comment)?;
-        image.write_little_endian(out)
+        write_little_endian(image, out)
     })
 }
 
@@ -46,7 +46,7 @@ fn write_header(
     writeln!(out, "Offset = {}", listed(geometry.origin_mm().to_array()))?;
     writeln!(out, "CenterOfRotation = 0 0 0")?;
     writeln!(out, "ElementSpacing = {}", listed(geometry.spacing_mm()))?;
-    writeln!(out, "DimSize = {} {} 1", image.columns(), image.rows())?;
+    writeln!(out, "DimSize = {} {} 1", image.width(), image.height())?;
     writeln!(out, "ElementType = MET_FLOAT")?;
     // The pixels begin right after this line.
     writeln!(out, "ElementDataFile = LOCAL")
@@ -68,6 +68,7 @@ mod tests {
 
     use glam::DVec3;
 
+    use super::super::image::image_of;
     use super::*;
 
     /// A reader of the header's `Key = value` lines and of the floats after the last, from the format's definition.
@@ -104,7 +105,7 @@ mod tests {
         let geometry =
             Geometry::new(origin, column_axis, row_axis, [0.388, 1.0 / 3.0, 1.0]).expect("a geometry");
         let pixels = vec![0.0, 0.1, f32::MIN_POSITIVE, -2.5, f32::INFINITY, 6.0];
-        let image = FloatImage::new(3, 2, pixels.clone()).expect("an image");
+        let image = image_of(3, 2, pixels.clone()).expect("an image");
 
         let bytes = write(&path, &image, &geometry, "own length of «liver», mm\n").expect("written");
 

@@ -19,4 +19,4 @@ pub mod projection;
 pub mod sidecar;
 
 pub use atomic::{create_folder, write_atomically};
-pub use image::{FloatImage, Geometry, Image};
+pub use image::{FloatImage, Geometry, RgbImage, RgbaImage, image_of};

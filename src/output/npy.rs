@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::atomic::write_atomically;
-use super::image::FloatImage;
+use super::image::{FloatImage, write_little_endian};
 use crate::Result;
 
 /// Writes an image as an NPY 1.0 array of shape (rows, columns), little-endian 32-bit floats in C order. Returns
@@ -14,7 +14,7 @@ use crate::Result;
 pub fn write(path: &Path, image: &FloatImage) -> Result<u64> {
     write_atomically(path, |out| {
         out.write_all(&header(image))?;
-        image.write_little_endian(out)
+        write_little_endian(image, out)
     })
 }
 
@@ -24,8 +24,8 @@ fn header(image: &FloatImage) -> Vec<u8> {
     const FIXED_BYTES: usize = 10;
     let mut dictionary = format!(
         "{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}), }}",
-        image.rows(),
-        image.columns()
+        image.height(),
+        image.width()
     );
     let total = (FIXED_BYTES + dictionary.len() + 1).next_multiple_of(ALIGNMENT);
     let padding = total - FIXED_BYTES - dictionary.len() - 1;
@@ -43,6 +43,7 @@ fn header(image: &FloatImage) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::image::image_of;
     use super::*;
 
     #[test]
@@ -51,7 +52,7 @@ mod tests {
         let path = folder.path().join("a.npy");
         for (columns, rows) in [(3, 2), (1, 1000), (123, 45)] {
             let pixels: Vec<f32> = (0..columns * rows).map(|i| i as f32 - 0.5).collect();
-            let image = FloatImage::new(columns, rows, pixels.clone()).expect("an image");
+            let image = image_of(columns, rows, pixels.clone()).expect("an image");
             write(&path, &image).expect("written");
 
             let bytes = std::fs::read(&path).expect("read");

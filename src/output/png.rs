@@ -1,12 +1,16 @@
 //! PNG: images to look at.
+//!
+//! Encoded by the crate `png`, not by the encoder of `image`, which writes no texts, no pixel size and no rows one at a
+//! time.
 
 use std::io::{self, Write};
 use std::path::Path;
 
+use ::image::{ImageBuffer, Pixel};
 use ::png::{BitDepth, ColorType, Encoder, PixelDimensions, SrgbRenderingIntent, Unit};
 
 use super::atomic::write_atomically;
-use super::image::{FloatImage, Image};
+use super::image::{FloatImage, RgbImage, RgbaImage, sample_rows};
 use crate::{Error, Result};
 
 /// Which end of a window is white, for values that grow with attenuation (p or a length).
@@ -82,7 +86,7 @@ impl Window {
 pub fn auto_window(image: &FloatImage) -> Window {
     const LOW_SHARE: f64 = 0.01;
     const HIGH_SHARE: f64 = 0.995;
-    let mut values: Vec<f32> = image.pixels().iter().copied().filter(|v| *v > 0.0 && v.is_finite()).collect();
+    let mut values: Vec<f32> = image.as_raw().iter().copied().filter(|v| *v > 0.0 && v.is_finite()).collect();
     let mut percentile = |share: f64| {
         let rank = (share * values.len().saturating_sub(1) as f64).round() as usize;
         if values.is_empty() {
@@ -123,8 +127,9 @@ pub fn write_grey(
     quantity: &str,
     labels: Labels,
 ) -> Result<u64> {
-    if let Some(i) = image.pixels().iter().position(|v| v.is_nan()) {
-        let (column, row) = (i % image.columns(), i / image.columns());
+    if let Some(i) = image.as_raw().iter().position(|v| v.is_nan()) {
+        let columns = image.width() as usize;
+        let (column, row) = (i % columns, i / columns);
         return Err(Error::input(
             path.display().to_string(),
             format!("the {quantity} in column {column}, row {row} is not a number"),
@@ -139,7 +144,7 @@ pub fn write_grey(
         ("Polarity", window.polarity.name()),
     ];
     write_atomically(path, |out| {
-        let mut encoder = labelled_encoder(out, image.columns(), image.rows(), &own, labels)?;
+        let mut encoder = labelled_encoder(out, image.dimensions(), &own, labels)?;
         encoder.set_color(ColorType::Grayscale);
         encoder.set_depth(BitDepth::Sixteen);
         write_rows(encoder, image, |row, bytes| {
@@ -152,7 +157,7 @@ pub fn write_grey(
 ///
 /// # Errors
 /// If a label is not valid or the file cannot be written.
-pub fn write_rgb(path: &Path, image: &Image<[u8; 3]>, labels: Labels) -> Result<u64> {
+pub fn write_rgb(path: &Path, image: &RgbImage, labels: Labels) -> Result<u64> {
     write_colour(path, image, ColorType::Rgb, labels)
 }
 
@@ -161,34 +166,32 @@ pub fn write_rgb(path: &Path, image: &Image<[u8; 3]>, labels: Labels) -> Result<
 ///
 /// # Errors
 /// If a label is not valid or the file cannot be written.
-pub fn write_rgba(path: &Path, image: &Image<[u8; 4]>, labels: Labels) -> Result<u64> {
+pub fn write_rgba(path: &Path, image: &RgbaImage, labels: Labels) -> Result<u64> {
     write_colour(path, image, ColorType::Rgba, labels)
 }
 
-fn write_colour<const N: usize>(
+fn write_colour<P: Pixel<Subpixel = u8>>(
     path: &Path,
-    image: &Image<[u8; N]>,
+    image: &ImageBuffer<P, Vec<u8>>,
     colour: ColorType,
     labels: Labels,
 ) -> Result<u64> {
     write_atomically(path, |out| {
-        let mut encoder = labelled_encoder(out, image.columns(), image.rows(), &[], labels)?;
+        let mut encoder = labelled_encoder(out, image.dimensions(), &[], labels)?;
         encoder.set_color(colour);
         encoder.set_depth(BitDepth::Eight);
         encoder.set_source_srgb(SrgbRenderingIntent::RelativeColorimetric);
-        write_rows(encoder, image, |row, bytes| bytes.extend(row.as_flattened()))
+        write_rows(encoder, image, |row, bytes| bytes.extend(row))
     })
 }
 
 fn labelled_encoder<'a>(
     out: &'a mut dyn Write,
-    columns: usize,
-    rows: usize,
+    (columns, rows): (u32, u32),
     own: &[(&str, &str)],
     labels: Labels,
 ) -> io::Result<Encoder<'static, &'a mut dyn Write>> {
-    // Images have sides below 2³¹.
-    let mut encoder = Encoder::new(out, columns as u32, rows as u32);
+    let mut encoder = Encoder::new(out, columns, rows);
     encoder.set_pixel_dims(labels.pixel_mm.and_then(pixels_per_metre));
     for (keyword, text) in own.iter().chain(labels.texts) {
         if text.is_ascii() {
@@ -212,15 +215,15 @@ fn pixels_per_metre(pixel_mm: [f64; 2]) -> Option<PixelDimensions> {
 }
 
 /// Encodes row after row; one row at a time is held as bytes.
-fn write_rows<T>(
+fn write_rows<P: Pixel>(
     encoder: Encoder<'static, &mut dyn Write>,
-    image: &Image<T>,
-    append: impl Fn(&[T], &mut Vec<u8>),
+    image: &ImageBuffer<P, Vec<P::Subpixel>>,
+    append: impl Fn(&[P::Subpixel], &mut Vec<u8>),
 ) -> io::Result<()> {
     let mut writer = encoder.write_header()?;
     let mut stream = writer.stream_writer()?;
     let mut bytes = Vec::new();
-    for row in image.each_row() {
+    for row in sample_rows(image) {
         bytes.clear();
         append(row, &mut bytes);
         stream.write_all(&bytes)?;
@@ -233,6 +236,7 @@ fn write_rows<T>(
 mod tests {
     use ::image::{DynamicImage, ImageReader};
 
+    use super::super::image::image_of;
     use super::*;
 
     fn open(path: &Path) -> DynamicImage {
@@ -249,7 +253,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("p.png");
         let pixels = vec![-1.0, 0.5, 1.5, 2.5, f32::INFINITY, f32::NEG_INFINITY];
-        let image = FloatImage::new(3, 2, pixels).expect("an image");
+        let image = image_of(3, 2, pixels).expect("an image");
         let window = Window::new(0.5, 2.5, Polarity::BoneWhite).expect("a window");
         let labels =
             Labels { pixel_mm: Some([0.388, 0.5]), texts: &[("View", "gantry 30°"), ("Software", "x")] };
@@ -291,13 +295,13 @@ mod tests {
     fn colours_come_back_with_8_bits() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("c.png");
-        let rgba = Image::new(2, 1, vec![[1, 2, 3, 4], [255, 0, 128, 255]]).expect("an image");
+        let rgba = image_of(2, 1, vec![1, 2, 3, 4, 255, 0, 128, 255]).expect("an image");
         write_rgba(&path, &rgba, Labels::default()).expect("written");
         let DynamicImage::ImageRgba8(back) = open(&path) else { panic!("not 8-bit RGBA") };
         assert_eq!(back.into_raw(), [1, 2, 3, 4, 255, 0, 128, 255]);
         assert!(info(&path).srgb.is_some() && info(&path).pixel_dims.is_none());
 
-        let rgb = Image::new(1, 2, vec![[1, 2, 3], [4, 5, 6]]).expect("an image");
+        let rgb = image_of(1, 2, vec![1, 2, 3, 4, 5, 6]).expect("an image");
         write_rgb(&path, &rgb, Labels::default()).expect("written");
         let DynamicImage::ImageRgb8(back) = open(&path) else { panic!("not 8-bit RGB") };
         assert_eq!((back.dimensions(), back.into_raw()), ((1, 2), vec![1, 2, 3, 4, 5, 6]));
@@ -308,10 +312,10 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("p.png");
         let window = Window::new(0.0, 1.0, Polarity::BoneWhite).expect("a window");
-        let image = FloatImage::new(2, 2, vec![0.0, 0.0, 0.0, f32::NAN]).expect("an image");
+        let image = image_of(2, 2, vec![0.0, 0.0, 0.0, f32::NAN]).expect("an image");
         let error = write_grey(&path, &image, &window, "p", Labels::default()).expect_err("NaN");
         assert!(error.to_string().contains("column 1, row 1"), "{error}");
-        let image = FloatImage::new(1, 1, vec![0.0]).expect("an image");
+        let image = image_of(1, 1, vec![0.0]).expect("an image");
         let labels = Labels { texts: &[("", "no keyword")], ..Labels::default() };
         assert!(write_grey(&path, &image, &window, "p", labels).is_err());
         assert!(!path.exists());
@@ -331,12 +335,12 @@ mod tests {
         let mut pixels = vec![0.0; 600];
         pixels.extend((0..400).map(|i| 1.0 + i as f32 / 399.0));
         pixels.push(1000.0);
-        let window = auto_window(&FloatImage::new(1001, 1, pixels).expect("an image"));
+        let window = auto_window(&image_of(1001, 1, pixels).expect("an image"));
         assert!((window.low() - 1.01).abs() < 0.003, "{window:?}");
         assert!((window.high() - 1.995).abs() < 0.003, "{window:?}");
 
         let ends = |pixels: Vec<f32>| {
-            let window = auto_window(&FloatImage::new(pixels.len(), 1, pixels).expect("an image"));
+            let window = auto_window(&image_of(pixels.len(), 1, pixels).expect("an image"));
             (window.low(), window.high())
         };
         assert_eq!(ends(vec![0.0, f32::NAN, f32::INFINITY, -1.0]), (0.0, 1.0));

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::png::{self, Labels, Window};
-use super::{FloatImage, Geometry, Image, create_folder, metaimage, npy};
+use super::{FloatImage, Geometry, RgbImage, create_folder, image_of, metaimage, npy};
 use crate::error::Result;
 use crate::modes::project::Projection;
 use crate::physics::composite::{encode_srgb8, over};
@@ -139,7 +139,7 @@ struct ViewWriter<'a> {
 impl ViewWriter<'_> {
     fn float_image(&self, pixels: Vec<f32>) -> Result<FloatImage> {
         let (columns, rows) = self.projection.size();
-        FloatImage::new(columns as usize, rows as usize, pixels)
+        image_of(columns as usize, rows as usize, pixels)
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -175,10 +175,10 @@ impl ViewWriter<'_> {
     }
 
     fn colour(&self) -> Result<WrittenFile> {
-        let pixels =
-            self.projection.colour().into_iter().map(|c| encode_srgb8(over(c, BACKGROUND))).collect();
+        let colours = self.projection.colour().into_iter();
+        let samples = colours.flat_map(|c| encode_srgb8(over(c, BACKGROUND))).collect();
         let (columns, rows) = self.projection.size();
-        let image = Image::new(columns as usize, rows as usize, pixels)?;
+        let image: RgbImage = image_of(columns as usize, rows as usize, samples)?;
         let file = format!("{}-colour.png", self.stem);
         let bytes = png::write_rgb(&self.path(&file), &image, self.labels())?;
         let quantity = "organs composited front to back, sRGB".into();
