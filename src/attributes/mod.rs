@@ -1,0 +1,3 @@
+//! Attributes of lines that RI-trees hold.
+
+pub mod chord;

@@ -1,0 +1,49 @@
+//! What a tree asks of whoever knows the objects.
+
+use crate::linespace::{Cell, LinePoint, PlanePair};
+
+/// A geometric attribute of lines near one object: what an RI-tree samples and interpolates.
+///
+/// The tree knows lines and cells, the attribute knows the object. Every method must be a pure function of its
+/// arguments: the tree relies on it for answers that depend neither on the order of queries nor on what is cached.
+pub trait Attribute: Sync {
+    /// What a line's sample is: a length, a point and a normal, an exit ray.
+    type Output: Clone + Send + Sync;
+
+    /// The exact output of a line.
+    fn sample(&self, line: LinePoint) -> Self::Output;
+
+    /// The equivalence class of the patch that the sample met; outputs are interpolated within one class only. A miss
+    /// is a class too. Attributes without discontinuities have one class.
+    fn class(&self, output: &Self::Output) -> u32;
+
+    /// The distance between two outputs of one class, in the unit of the distance threshold.
+    fn distance(&self, a: &Self::Output, b: &Self::Output) -> f64;
+
+    /// The output that the weighted outputs of one class make; weights sum to 1, but may be negative where five or
+    /// more usable samples are extrapolated.
+    fn interpolate(&self, parts: &[(f64, &Self::Output)]) -> Self::Output;
+
+    /// The class of a line, by the one intersection test of §2.5, asked when a cell holds exactly two. `None` if the test
+    /// costs as much as tracing the line, which is then done instead.
+    fn locate(&self, _line: LinePoint) -> Option<u32> {
+        None
+    }
+
+    /// Whether the class stands for lines that do not meet the object.
+    fn is_miss(&self, class: u32) -> bool;
+
+    /// The direction of an output, for the angular threshold. `None` for attributes without directions.
+    fn direction(&self, _output: &Self::Output) -> Option<glam::DVec3> {
+        None
+    }
+
+    /// Whether a line and its reverse have the same output, so that +X and −X can share a tree.
+    fn is_symmetric(&self) -> bool {
+        false
+    }
+
+    /// Whether no line of the cell meets the object, *proved*. Corners that all miss prove nothing: an object smaller than
+    /// the cell may lie between them. `false` where in doubt.
+    fn is_certainly_empty(&self, pair: PlanePair, cell: &Cell) -> bool;
+}

@@ -1,0 +1,221 @@
+//! What a cell's samples decide: whether it is final, and what its lines get. Pure functions of the cell.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::Parameters;
+use super::attribute::Attribute;
+use crate::linespace::{Cell, LinePoint, PlanePair};
+
+/// The outputs at the 16 corner lines of a cell, by the corner's bits (s, t, u, v from the lowest).
+pub type Corners<T> = [T; 16];
+
+/// The fewest samples that define a linear interpolant in 4-space (§2.5).
+const LINEAR_SAMPLES: usize = 5;
+
+/// What is to be done with a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// Its halves are to be looked at.
+    Split,
+    /// It answers its lines itself.
+    Final(Kind),
+}
+
+/// How a final cell answers its lines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// No line meets the object, proved.
+    Empty,
+    /// Quadrilinear interpolation of the 16 corners.
+    Smooth,
+    /// Two classes: the line's own class is found, and its samples interpolated if they suffice.
+    TwoClasses,
+    /// By tracing.
+    Traced(Reason),
+}
+
+/// Why a line is traced instead of interpolated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reason {
+    /// Its cell lies across the object's outline, or another single discontinuity.
+    Silhouette,
+    /// Its cell holds more than two classes.
+    Classes,
+    /// Output directions of its cell differ by more than the angular threshold.
+    Angle,
+    /// All corners miss, and nothing proves that the lines between do.
+    Guard,
+}
+
+/// A cell of one plane pair, as deep in the tree as it is small.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    pub pair: PlanePair,
+    pub cell: Cell,
+    pub depth: u32,
+}
+
+impl Place {
+    pub fn root(pair: PlanePair) -> Self {
+        Self { pair, cell: Cell::ROOT, depth: 0 }
+    }
+
+    /// The axis that the cell is split across: the longest, which in a cube of halved cells is each in turn.
+    pub fn axis(&self) -> usize {
+        self.depth as usize % 4
+    }
+
+    /// Which half holds the point: 0 or 1.
+    pub fn side_of(&self, stuv: &[f64; 4]) -> usize {
+        let axis = self.axis();
+        usize::from(stuv[axis] >= 0.5 * (self.cell.low[axis] + self.cell.high[axis]))
+    }
+
+    pub fn half(&self, side: usize) -> Self {
+        Self { cell: self.cell.halves(self.axis())[side], depth: self.depth + 1, ..*self }
+    }
+
+    fn line(&self, stuv: [f64; 4]) -> LinePoint {
+        LinePoint { pair: self.pair, stuv }
+    }
+
+    /// Samples all 16 corners.
+    pub fn sample<A: Attribute>(&self, attribute: &A) -> Corners<A::Output> {
+        std::array::from_fn(|bits| attribute.sample(self.line(self.cell.corner(bits))))
+    }
+
+    /// The corners of the two halves: 8 of each are the cell's own, 8 new ones are sampled and shared.
+    pub fn split<A: Attribute>(&self, attribute: &A, corners: &Corners<A::Output>) -> [Corners<A::Output>; 2] {
+        let axis = self.axis();
+        let lower = self.half(0).cell;
+        let is_high = |bits: usize| bits >> axis & 1 == 1;
+        // The lower half's high side lies on the cut.
+        let cut: [Option<A::Output>; 16] = std::array::from_fn(|bits| {
+            is_high(bits).then(|| attribute.sample(self.line(lower.corner(bits))))
+        });
+        let on_cut = |bits: usize| cut[bits | 1 << axis].clone();
+        let pick = |own: bool, bits: usize| match on_cut(bits) {
+            Some(sample) if !own => sample,
+            _ => corners[bits].clone(),
+        };
+        [
+            std::array::from_fn(|bits| pick(!is_high(bits), bits)),
+            std::array::from_fn(|bits| pick(is_high(bits), bits)),
+        ]
+    }
+
+    /// What is to be done with the cell (§2.3, and §2.5 for its kind).
+    pub fn verdict<A: Attribute>(
+        &self,
+        attribute: &A,
+        corners: &Corners<A::Output>,
+        parameters: &Parameters,
+    ) -> Verdict {
+        let is_deepest = self.depth >= parameters.max_depth;
+        let class = attribute.class(&corners[0]);
+        let other = corners.iter().map(|c| attribute.class(c)).find(|&c| c != class);
+        if let Some(other) = other {
+            // No interpolant crosses a discontinuity; smaller cells leave fewer lines on it.
+            let third = corners.iter().map(|c| attribute.class(c)).any(|c| c != class && c != other);
+            return match (is_deepest, third) {
+                (false, _) => Verdict::Split,
+                (true, false) => Verdict::Final(Kind::TwoClasses),
+                (true, true) => Verdict::Final(Kind::Traced(Reason::Classes)),
+            };
+        }
+        if attribute.is_miss(class) {
+            return if attribute.is_certainly_empty(self.pair, &self.cell) {
+                Verdict::Final(Kind::Empty)
+            } else if is_deepest {
+                Verdict::Final(Kind::Traced(Reason::Guard))
+            } else {
+                Verdict::Split
+            };
+        }
+        if !is_deepest && !self.middle_is_near(attribute, corners, class, parameters.distance_threshold) {
+            return Verdict::Split;
+        }
+        if spread_exceeds(attribute, corners.iter(), parameters.angular_threshold_deg) {
+            return Verdict::Final(Kind::Traced(Reason::Angle));
+        }
+        Verdict::Final(Kind::Smooth)
+    }
+
+    /// The midpoint test: interpolated against exact at the cell's centre.
+    fn middle_is_near<A: Attribute>(
+        &self,
+        attribute: &A,
+        corners: &Corners<A::Output>,
+        class: u32,
+        threshold: f64,
+    ) -> bool {
+        let exact = attribute.sample(self.line(self.cell.centre()));
+        if attribute.class(&exact) != class {
+            return false;
+        }
+        let near = attribute.distance(&quadrilinear(attribute, corners, [0.5; 4]), &exact);
+        near <= threshold
+    }
+
+    /// The interpolated output of a line of a cell of two classes, or why it is traced.
+    pub fn of_own_class<A: Attribute>(
+        &self,
+        attribute: &A,
+        corners: &Corners<A::Output>,
+        stuv: [f64; 4],
+        angular_threshold_deg: f64,
+    ) -> Result<A::Output, Reason> {
+        let class = attribute.locate(self.line(stuv)).ok_or(Reason::Silhouette)?;
+        let usable = |bits: &usize| attribute.class(&corners[*bits]) == class;
+        let usable: Vec<usize> = (0..16).filter(usable).collect();
+        if spread_exceeds(attribute, usable.iter().map(|&bits| &corners[bits]), angular_threshold_deg) {
+            return Err(Reason::Angle);
+        }
+        let weights =
+            linear_weights(&usable, self.cell.fractions(&stuv)).ok_or(Reason::Silhouette)?;
+        let parts: Vec<_> = usable.iter().zip(weights).map(|(&bits, w)| (w, &corners[bits])).collect();
+        Ok(attribute.interpolate(&parts))
+    }
+}
+
+/// Quadrilinear interpolation at fractions of the cell: bilinear in (u, v) within each directional group, the four
+/// corners that share (s, t), then bilinear in (s, t) (§2.4). As weights the two steps are one product.
+pub fn quadrilinear<A: Attribute>(
+    attribute: &A,
+    corners: &Corners<A::Output>,
+    fractions: [f64; 4],
+) -> A::Output {
+    let weight = |bits: usize| -> f64 {
+        (0..4).map(|a| if bits >> a & 1 == 0 { 1.0 - fractions[a] } else { fractions[a] }).product()
+    };
+    let parts: [(f64, &A::Output); 16] = std::array::from_fn(|bits| (weight(bits), &corners[bits]));
+    attribute.interpolate(&parts)
+}
+
+/// The weights of the corners `usable` in the linear function that fits them best, at `fractions`. `None` if they do not
+/// define one: fewer than five, or all in one hyperplane.
+fn linear_weights(usable: &[usize], fractions: [f64; 4]) -> Option<Vec<f64>> {
+    if usable.len() < LINEAR_SAMPLES {
+        return None;
+    }
+    let row = |f: [f64; 4]| SVector::<f64, 5>::from([1.0, f[0], f[1], f[2], f[3]]);
+    let corner = |bits: usize| row(std::array::from_fn(|a| (bits >> a & 1) as f64));
+    let normal: SMatrix<f64, 5, 5> = usable.iter().map(|&bits| corner(bits) * corner(bits).transpose()).sum();
+    // Entries are small integers, so a singular matrix has a pivot that is zero up to rounding.
+    let at = normal.cholesky().filter(|c| c.l_dirty().diagonal().min() > 1e-6)?.solve(&row(fractions));
+    Some(usable.iter().map(|&bits| corner(bits).dot(&at)).collect())
+}
+
+/// Whether two of the outputs' directions differ by more than the threshold.
+fn spread_exceeds<'a, A: Attribute>(
+    attribute: &A,
+    outputs: impl Iterator<Item = &'a A::Output>,
+    threshold_deg: f64,
+) -> bool
+where
+    A::Output: 'a,
+{
+    let directions: Vec<_> = outputs.filter_map(|o| attribute.direction(o)).collect();
+    let least_cosine = threshold_deg.to_radians().cos();
+    directions.iter().enumerate().any(|(i, a)| directions[..i].iter().any(|b| a.dot(*b) < least_cosine))
+}

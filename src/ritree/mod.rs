@@ -1,0 +1,233 @@
+//! The ray interpolant tree of Atalay & Mount (§2): attributes of lines, sampled where they are asked for and
+//! interpolated in between.
+//!
+//! ```text
+//!   query (s,t,u,v) ─► descend ─► final leaf? ── yes ─► interpolate its 16 corners, or say why to trace
+//!                                  │ no
+//!                                  ▼
+//!                       corners + midpoint decide: final, or split across the longest side
+//!                       (8 corners kept, 8 new ones sampled, shared by both halves)
+//! ```
+//!
+//! **The law:** what becomes of a cell is a pure function of the cell. So the answer to a line depends neither on the
+//! order of queries, nor on threads, nor on what the cache still holds; where the cache has no room, the cells on the
+//! way are computed, used and forgotten.
+//!
+//! Threads share a tree without locks on the way down: a node's halves and its final samples are written once. Only
+//! the expansion of a node takes that node's lock.
+
+pub mod attribute;
+mod cache;
+mod cell;
+mod node;
+mod stats;
+
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+pub use attribute::Attribute;
+pub use cache::Cache;
+pub use cell::Reason;
+pub use stats::{BuildCounts, TreeShape};
+
+use crate::linespace::{LinePoint, is_in_range};
+use cell::{Kind, Place, Verdict, quadrilinear};
+use node::{Leaf, Node};
+use stats::BuildCounters;
+
+/// The tree's settings; the defaults are the paper's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameters {
+    /// A cell splits if its middle is interpolated worse than this, in the attribute's own distance.
+    pub distance_threshold: f64,
+    /// Directions farther apart than this are not interpolated, degrees.
+    pub angular_threshold_deg: f64,
+    /// The depth at which cells are final whatever their middle says.
+    pub max_depth: u32,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self { distance_threshold: 0.05, angular_threshold_deg: 30.0, max_depth: 28 }
+    }
+}
+
+/// The answer to one line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Answer<T> {
+    /// Interpolated, or proved to miss.
+    Interpolated(T),
+    /// The line is to be traced.
+    Trace(Reason),
+}
+
+/// The RI-tree of one object: six kd-trees over line space, grown on demand.
+pub struct RiTree<A: Attribute> {
+    attribute: A,
+    parameters: Parameters,
+    roots: [OnceLock<Box<Node<A::Output>>>; 6],
+    clock: AtomicU32,
+    counters: BuildCounters,
+}
+
+impl<A: Attribute> RiTree<A> {
+    /// A tree that has seen no line yet.
+    pub fn new(attribute: A, parameters: Parameters) -> Self {
+        Self {
+            attribute,
+            parameters,
+            roots: Default::default(),
+            clock: AtomicU32::new(1),
+            counters: BuildCounters::default(),
+        }
+    }
+
+    /// The attribute.
+    pub fn attribute(&self) -> &A {
+        &self.attribute
+    }
+
+    /// The attribute of a line near the object. `None` if the line cannot meet the object's box.
+    ///
+    /// Cells on the way that do not exist yet are made and kept while `cache` has room.
+    pub fn query(&self, line: LinePoint, cache: &Cache) -> Option<Answer<A::Output>> {
+        let line = if self.attribute.is_symmetric() && line.pair.is_reversed() { line.reversed() } else { line };
+        if !is_in_range(&line.stuv) {
+            return None;
+        }
+        let mut place = Place::root(line.pair);
+        let root = &self.roots[line.pair.index()];
+        let mut node = match root.get() {
+            Some(node) => node,
+            None if cache.reserve(node::bytes::<A::Output>(1)) => root.get_or_init(Box::default),
+            None => return Some(self.answer_without_keeping(place, None, line.stuv)),
+        };
+        loop {
+            if let Some(leaf) = node.leaf() {
+                leaf.touch(self.clock.load(Ordering::Relaxed));
+                return Some(self.answer(&place, leaf, line.stuv));
+            }
+            if node.halves().is_none() {
+                match node.expand(&place, self, cache) {
+                    Ok(()) => continue,
+                    Err(corners) => return Some(self.answer_without_keeping(place, corners, line.stuv)),
+                }
+            }
+            let Some(halves) = node.halves() else { continue };
+            let side = place.side_of(&line.stuv);
+            (node, place) = (&halves[side], place.half(side));
+        }
+    }
+
+    /// The same answer, computed on a path that is not kept.
+    fn answer_without_keeping(
+        &self,
+        mut place: Place,
+        corners: Option<Box<cell::Corners<A::Output>>>,
+        stuv: [f64; 4],
+    ) -> Answer<A::Output> {
+        let mut corners = corners.map_or_else(|| self.sample_corners(&place), |c| *c);
+        loop {
+            match self.verdict(&place, &corners) {
+                Verdict::Final(kind) => return self.answer(&place, &Leaf::new(kind, corners, 0), stuv),
+                Verdict::Split => {
+                    let side = place.side_of(&stuv);
+                    let [lower, upper] = self.split(&place, &corners);
+                    corners = if side == 0 { lower } else { upper };
+                    place = place.half(side);
+                    self.counters.transient();
+                }
+            }
+        }
+    }
+
+    fn answer(&self, place: &Place, leaf: &Leaf<A::Output>, stuv: [f64; 4]) -> Answer<A::Output> {
+        let corners = leaf.corners();
+        match leaf.kind() {
+            Kind::Empty => Answer::Interpolated(corners[0].clone()),
+            Kind::Smooth => {
+                let fractions = place.cell.fractions(&stuv);
+                Answer::Interpolated(quadrilinear(&self.attribute, corners, fractions))
+            }
+            Kind::TwoClasses => {
+                let angle = self.parameters.angular_threshold_deg;
+                place
+                    .of_own_class(&self.attribute, corners, stuv, angle)
+                    .map_or_else(Answer::Trace, Answer::Interpolated)
+            }
+            Kind::Traced(reason) => Answer::Trace(reason),
+        }
+    }
+
+    fn sample_corners(&self, place: &Place) -> cell::Corners<A::Output> {
+        self.counters.sampled(16, 0);
+        place.sample(&self.attribute)
+    }
+
+    fn split(&self, place: &Place, corners: &cell::Corners<A::Output>) -> [cell::Corners<A::Output>; 2] {
+        self.counters.sampled(8, 24);
+        place.split(&self.attribute, corners)
+    }
+
+    fn verdict(&self, place: &Place, corners: &cell::Corners<A::Output>) -> Verdict {
+        place.verdict(&self.attribute, corners, &self.parameters)
+    }
+
+    /// Lets time pass for the least-recently-used rule; call it now and then, such as once per tile of rays.
+    pub fn tick(&self) {
+        // At the end of time, stamps stay at the last one: pruning then forgets by position, answers do not change.
+        let _ = self.clock.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |t| t.checked_add(1));
+    }
+
+    /// Adds the time stamps of the final leaves, and the bytes that each holds, to `stamps`.
+    pub fn collect_stamps(&self, stamps: &mut Vec<(u32, usize)>) {
+        self.nodes().for_each(|root| root.collect_stamps(stamps));
+    }
+
+    /// Forgets all leaves with time stamps before `oldest_kept`, and all cells only they needed. Answers do not change:
+    /// what is asked for again is built again.
+    pub fn prune(&mut self, oldest_kept: u32, cache: &Cache) {
+        for root in &mut self.roots {
+            if let Some(node) = root.get_mut()
+                && !node.prune(oldest_kept, cache)
+            {
+                root.take();
+                cache.release(node::bytes::<A::Output>(1));
+            }
+        }
+        self.counters.pruned();
+    }
+
+    /// What building took.
+    pub fn build_counts(&self) -> BuildCounts {
+        self.counters.get()
+    }
+
+    /// How many nodes and leaves there are, and how deep.
+    pub fn shape(&self) -> TreeShape {
+        let mut shape = TreeShape::default();
+        self.nodes().for_each(|root| root.add_to(0, &mut shape));
+        shape
+    }
+
+    fn nodes(&self) -> impl Iterator<Item = &Node<A::Output>> {
+        self.roots.iter().filter_map(|root| root.get().map(|node| &**node))
+    }
+
+    /// Walks the whole tree and checks that what it stores is what the cells say: each corner is its line's sample,
+    /// halves tile their cell and share the samples on the cut, final leaves are final and others are not, and the
+    /// bytes add up. Returns the bytes. For tests: it samples every corner anew.
+    ///
+    /// # Panics
+    /// If something is not so.
+    pub fn check_invariants(&self) -> usize
+    where
+        A::Output: PartialEq + std::fmt::Debug,
+    {
+        let pairs = crate::linespace::PlanePair::ALL.iter().zip(&self.roots);
+        pairs
+            .filter_map(|(&pair, root)| root.get().map(|node| (pair, node)))
+            .map(|(pair, node)| node::bytes::<A::Output>(1) + node.check(&Place::root(pair), self))
+            .sum()
+    }
+}
