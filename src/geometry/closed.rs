@@ -273,6 +273,16 @@ mod tests {
     use super::super::primitives::{cube, icosphere};
     use super::*;
 
+    fn block(low: [f64; 3], high: [f64; 3]) -> TriMesh {
+        let (low, high) = (DVec3::from(low), DVec3::from(high));
+        cube(1.0).map_vertices(|v| low + (v + 0.5) * (high - low))
+    }
+
+    fn inside_out(mut mesh: TriMesh) -> TriMesh {
+        mesh.faces.iter_mut().for_each(|f| f.swap(0, 1));
+        mesh
+    }
+
     #[test]
     fn a_cube_is_closed_and_holds_its_volume() {
         let (mesh, notices) = ClosedMesh::new(cube(2.0)).expect("closed");
@@ -285,9 +295,7 @@ mod tests {
 
     #[test]
     fn an_inside_out_cube_is_turned_with_a_notice() {
-        let mut inside_out = cube(2.0);
-        inside_out.faces.iter_mut().for_each(|f| f.swap(0, 1));
-        let (mesh, notices) = ClosedMesh::new(inside_out).expect("closed");
+        let (mesh, notices) = ClosedMesh::new(inside_out(cube(2.0))).expect("closed");
         assert_eq!(mesh.volume_mm3(), 8.0);
         assert_eq!(notices, [Notice::TurnedInsideOut { components: 1, of: 1 }]);
     }
@@ -318,16 +326,13 @@ mod tests {
     #[test]
     fn a_cavity_looks_inward_and_its_volume_is_taken_off() {
         let mut shell = cube(4.0);
-        let mut hole = cube(2.0);
-        hole.faces.iter_mut().for_each(|f| f.swap(0, 1));
-        shell.append(&hole);
+        shell.append(&inside_out(cube(2.0)));
         let (mesh, notices) = ClosedMesh::new(shell.clone()).expect("closed");
         assert_eq!(notices, []);
         assert!((mesh.volume_mm3() - 56.0).abs() < 1e-12);
         assert_eq!(mesh.side_of(DVec3::ZERO), Side::Outside);
 
-        shell.faces.iter_mut().for_each(|f| f.swap(0, 1));
-        let (mesh, notices) = ClosedMesh::new(shell).expect("closed");
+        let (mesh, notices) = ClosedMesh::new(inside_out(shell)).expect("closed");
         assert!((mesh.volume_mm3() - 56.0).abs() < 1e-12);
         assert_eq!(notices, [Notice::TurnedInsideOut { components: 2, of: 2 }]);
     }
@@ -337,16 +342,6 @@ mod tests {
         let mut nested = cube(4.0);
         nested.append(&cube(2.0));
         assert!(matches!(ClosedMesh::new(nested), Err(MeshFault::OverlappingComponents { .. })));
-    }
-
-    fn block(low: [f64; 3], high: [f64; 3]) -> TriMesh {
-        let (low, high) = (DVec3::from(low), DVec3::from(high));
-        cube(1.0).map_vertices(|v| low + (v + 0.5) * (high - low))
-    }
-
-    fn inside_out(mut mesh: TriMesh) -> TriMesh {
-        mesh.faces.iter_mut().for_each(|f| f.swap(0, 1));
-        mesh
     }
 
     #[test]
