@@ -257,3 +257,25 @@ fn an_interrupt_exits_130_and_leaves_no_partial_file() {
     let left = files(&folder_of_output);
     assert!(!left.iter().any(|f| f == "balls.json" || f.starts_with(".tmp")), "{left:?}");
 }
+
+#[test]
+fn an_exported_phantom_has_the_same_lengths_to_the_last_bit() {
+    let folder = folder();
+    let run = |args: &[&str]| {
+        let run = chordfield(folder.path(), args);
+        assert_eq!(run.status.code(), Some(0), "{}", err(&run));
+    };
+    run(&["phantom", "export", "calibration", "exported"]);
+    for (scene, to) in [("calibration", "a"), ("exported/calibration.toml", "b")] {
+        run(&["project", scene, "--write", "lengths", "--size", "50x50", "-o", to]);
+    }
+    for organ in ["sphere", "box", "tetrahedron", "cylinder"] {
+        let read = |run: &str| {
+            MetaImage::read(&folder.path().join(format!("{run}/calibration-g000-lengths/{organ}.mha"))).values
+        };
+        assert!(read("a").iter().any(|&length| length > 0.0));
+        assert_eq!(read("a"), read("b"), "{organ}");
+    }
+    let shown = chordfield(folder.path(), &["phantom", "list"]);
+    assert!(out(&shown).lines().count() >= 4 && out(&shown).contains("adult-skeleton"));
+}

@@ -30,7 +30,7 @@ struct PlaneBlock {
 impl ConvexClipper {
     /// Lays out all planes of `body`.
     pub fn new(body: &ConvexMesh) -> Self {
-        Self::of_planes(body.planes())
+        Self::of_planes(body.planes().iter())
     }
 
     fn of_planes<'a>(planes: impl Iterator<Item = &'a Plane>) -> Self {
@@ -113,15 +113,18 @@ impl<'a> NarrowedClipper<'a> {
     /// Narrows `all`, the clipper of `body`, to a convex region. `may_touch` must be true for every box that shares
     /// a point with the region.
     pub fn new(body: &ConvexMesh, all: &'a ConvexClipper, may_touch: impl Fn(&Bounds) -> bool) -> Self {
-        let mut faces = Vec::new();
+        let mut planes = Vec::new();
         let mesh = body.surface().mesh();
         body.surface().tree().visit(&may_touch, |face| {
             if may_touch(&Bounds::of(mesh.triangle(face as usize))) {
-                faces.push(face as usize);
+                planes.extend(body.plane_of(face as usize));
             }
         });
-        let near = (2 * faces.len() < mesh.faces.len())
-            .then(|| ConvexClipper::of_planes(faces.iter().filter_map(|&f| body.plane_of(f))));
+        planes.sort_unstable();
+        planes.dedup();
+        let all_planes = body.planes();
+        let near = (2 * planes.len() < all_planes.len())
+            .then(|| ConvexClipper::of_planes(planes.iter().map(|&p| &all_planes[p as usize])));
         Self { all, near, body_in_region: Known::NotYet }
     }
 

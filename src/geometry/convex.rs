@@ -1,6 +1,7 @@
 //! Convex bodies: closed surfaces all of whose vertices lie behind all of their face planes.
 
 use std::cell::Cell;
+use std::collections::HashMap;
 
 use glam::DVec3;
 
@@ -24,8 +25,10 @@ pub struct Plane {
 #[derive(Clone, Debug)]
 pub struct ConvexMesh {
     surface: ClosedMesh,
+    /// Each plane once, in the order of the first face in it.
+    planes: Vec<Plane>,
     /// By face; a face without area has none.
-    planes: Vec<Option<Plane>>,
+    plane_of_face: Vec<Option<u32>>,
     reflex_depth_mm: f64,
 }
 
@@ -76,20 +79,16 @@ impl ConvexMesh {
             return Err(Box::new((surface, NotConvex::Handles(handles))));
         }
         // A face without area bounds nothing: its plane is left out, and its neighbours close the body.
-        let planes: Vec<Option<Plane>> = surface
-            .mesh()
-            .triangles()
-            .map(|t| Some(Plane { point: t[0], normal: unit_normal(t)? }))
-            .collect();
+        let (planes, plane_of_face) = distinct_planes(&surface);
         let tolerance_mm = rounding_tolerance_mm(surface.mesh().vertices.iter());
-        let (depth_mm, place) = planes.iter().flatten().fold((0.0, DVec3::ZERO), |worst, plane| {
+        let (depth_mm, place) = planes.iter().fold((0.0, DVec3::ZERO), |worst, plane| {
             let (depth, vertex) = farthest_in_front(&surface, plane, worst.0);
             if depth > worst.0 { (depth, vertex) } else { worst }
         });
         if depth_mm > tolerance_mm {
             return Err(Box::new((surface, NotConvex::Reflex { depth_mm, tolerance_mm, place })));
         }
-        Ok(Self { surface, planes, reflex_depth_mm: depth_mm })
+        Ok(Self { surface, planes, plane_of_face, reflex_depth_mm: depth_mm })
     }
 
     /// The surface.
@@ -97,14 +96,14 @@ impl ConvexMesh {
         &self.surface
     }
 
-    /// The face planes, in the order of the faces; faces without area have none.
-    pub fn planes(&self) -> impl Iterator<Item = &Plane> {
-        self.planes.iter().flatten()
+    /// The face planes: each once, however many faces lie in it.
+    pub fn planes(&self) -> &[Plane] {
+        &self.planes
     }
 
-    /// The plane of one face. `None` if it has no area.
-    pub fn plane_of(&self, face: usize) -> Option<&Plane> {
-        self.planes[face].as_ref()
+    /// The index of a face's plane. `None` if the face has no area.
+    pub fn plane_of(&self, face: usize) -> Option<u32> {
+        self.plane_of_face[face]
     }
 
     /// How far the worst vertex stands out of a face's plane, mm: no more than rounding explains.
@@ -116,6 +115,30 @@ impl ConvexMesh {
     pub fn bounds(&self) -> Bounds {
         self.surface.bounds()
     }
+}
+
+/// The planes of the faces, and each face's; faces whose normals are equal to the last bit and whose corners lie in
+/// one another's planes without rounding share one. A cylinder's end of five hundred triangles is one plane.
+fn distinct_planes(surface: &ClosedMesh) -> (Vec<Plane>, Vec<Option<u32>>) {
+    let mut planes: Vec<Plane> = Vec::new();
+    let mut by_normal: HashMap<[u64; 3], Vec<u32>> = HashMap::new();
+    let of_face = surface
+        .mesh()
+        .triangles()
+        .map(|triangle| {
+            let normal = unit_normal(triangle)?;
+            // Adding zero makes −0 and 0 one key.
+            let alike = by_normal.entry((normal + 0.0).to_array().map(f64::to_bits)).or_default();
+            let in_plane = |p: &Plane| triangle.iter().all(|&corner| p.normal.dot(corner - p.point) == 0.0);
+            if let Some(&known) = alike.iter().find(|&&i| in_plane(&planes[i as usize])) {
+                return Some(known);
+            }
+            planes.push(Plane { point: triangle[0], normal });
+            alike.push(planes.len() as u32 - 1);
+            alike.last().copied()
+        })
+        .collect();
+    (planes, of_face)
 }
 
 /// The greatest height of a vertex over the plane, if above `at_least`, and that vertex.
@@ -189,10 +212,11 @@ mod tests {
         for offset in [0.0, 1e3, 1e6] {
             let moved = |v: DVec3| 50.0 * v * DVec3::new(1.0, 0.2, 3.0) + offset;
             let body = convex(icosphere(3).map_vertices(moved)).expect("convex");
-            assert_eq!(body.planes().count(), 1280);
+            assert_eq!(body.planes().len(), 1280);
             assert!(body.reflex_depth_mm() <= 1e-9, "{offset}: {}", body.reflex_depth_mm());
         }
-        assert_eq!(convex(cube(2.0)).expect("convex").reflex_depth_mm(), 0.0);
+        let cube = convex(cube(2.0)).expect("convex");
+        assert_eq!((cube.reflex_depth_mm(), cube.planes().len()), (0.0, 6));
     }
 
     #[test]

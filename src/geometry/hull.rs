@@ -8,7 +8,7 @@
 //!      h───────────h
 //! ```
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use glam::DVec3;
 use robust::{Coord, Coord3D, orient2d, orient3d};
@@ -22,6 +22,13 @@ use super::{Bounds, TriMesh};
 /// for a body 2 m tall, 2e-8 mm: far below any tessellation. Without it such points become faces so thin that
 /// their normals are noise.
 pub const HULL_TOLERANCE: f64 = 1e-11;
+
+/// The least height of a face, as a fraction of its longest edge; a corner that makes a lower one is left out.
+///
+/// Rounding tilts the normal of a face by some 2⁻⁵³ over this ratio. At √2⁻⁵³ ≈ 1e-8 the tilt and what leaving the corner
+/// out takes off the hull are alike, and both are as small as they can be: 1e-6 mm for a body of 100 mm. Points of
+/// a tessellation are many orders above it; points that were meant to be collinear, and miss by more than rounding, are not.
+const NEEDLE_RATIO: f64 = 1e-8;
 
 /// Why points have no hull.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -41,8 +48,8 @@ pub enum HullError {
 /// from outside, only the corners kept, in the order in which they were given.
 ///
 /// The mesh is convex exactly: no vertex is beyond the plane of any face, by the exact sign of the determinant.
-/// A given point may stick out of it by at most about [`HULL_TOLERANCE`] of the extent. The result depends on the
-/// points and their order only. Typically `n log n`.
+/// A given point may stick out of it by at most about [`HULL_TOLERANCE`] of the extent, or 1e-8 of an edge that it lies
+/// on. The result depends on the points and their order only. Typically `n log n`.
 ///
 /// Errors if a coordinate is not finite, or if the points span no volume.
 ///
@@ -317,22 +324,21 @@ fn coordinates(p: DVec3) -> Coord3D<f64> {
     Coord3D { x: p.x, y: p.y, z: p.z }
 }
 
-/// Corners that lie within the tolerance of the longest edge of one of their faces: exactly convex, but a needle.
-/// Sorted.
+/// Corners that lie nearly on the longest edge of one of their faces: exactly convex, but a needle.
+/// Sorted. At most one of a face's corners is named, because each is redundant only while the others stay.
 fn corners_on_their_longest_edge(points: &[DVec3], faces: &[[u32; 3]], tolerance_mm: f64) -> Vec<u32> {
-    let mut redundant = Vec::new();
+    let mut redundant = BTreeSet::new();
     for face in faces {
         let [a, b, c] = face.map(|v| points[v as usize]);
         let opposite = [(c - b).length(), (a - c).length(), (b - a).length()];
         let longest = (0..3).fold(0, |best, i| if opposite[i] > opposite[best] { i } else { best });
         let height = (b - a).cross(c - a).length() / opposite[longest];
-        if height.is_nan() || height <= tolerance_mm {
-            redundant.push(face[longest]);
+        let is_needle = height.is_nan() || height <= tolerance_mm.max(NEEDLE_RATIO * opposite[longest]);
+        if is_needle && face.iter().all(|v| !redundant.contains(v)) {
+            redundant.insert(face[longest]);
         }
     }
-    redundant.sort_unstable();
-    redundant.dedup();
-    redundant
+    redundant.into_iter().collect()
 }
 
 /// The mesh over the vertices that faces use.

@@ -12,6 +12,7 @@
 //! [`Shape::tessellation_depth_mm`]. A *nested* mesh must keep clear of its parent's by that much.
 
 mod body;
+mod checks;
 mod cut;
 pub(super) mod frame;
 mod layout;
