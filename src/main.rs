@@ -32,7 +32,13 @@ fn prepare(cli: &Cli, session: &Session) -> Result<(), Error> {
         .num_threads(threads)
         .build_global()
         .map_err(|e| refused("threads", &e))?;
-    ctrlc::set_handler(session.canceller()).map_err(|e| refused("signals", &e))
+    let leave_at_once = session.canceller();
+    let stop = move || {
+        if leave_at_once() {
+            std::process::exit(Error::Interrupted.exit_code().into());
+        }
+    };
+    ctrlc::set_handler(stop).map_err(|e| refused("signals", &e))
 }
 
 fn fail(error: &Error) -> ExitCode {

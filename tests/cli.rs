@@ -279,3 +279,24 @@ fn an_exported_phantom_has_the_same_lengths_to_the_last_bit() {
     let shown = chordfield(folder.path(), &["phantom", "list"]);
     assert!(out(&shown).lines().count() >= 4 && out(&shown).contains("adult-skeleton"));
 }
+
+#[cfg(unix)]
+#[test]
+fn interrupting_a_run_that_still_loads_its_scene_stops_it_at_once() {
+    let folder = folder();
+    let pipe = folder.path().join("never.toml");
+    assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo runs").success());
+    for command in ["project", "check"] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_chordfield"))
+            .args([command, &pipe.to_string_lossy()])
+            .stdin(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the program starts");
+        // Opening the pipe to write waits for the program to read: it is loading now.
+        let _never_written = std::fs::OpenOptions::new().write(true).open(&pipe).expect("the program reads");
+        let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+        assert!(kill.expect("kill runs").success());
+        assert_eq!(child.wait().expect("an end").code(), Some(130), "{command}");
+    }
+}

@@ -138,3 +138,40 @@ fn a_cancelled_projection_is_interrupted() {
     let stopped = projector.project(view, 0, &Control::new(&stop, &silent));
     assert!(matches!(stopped, Err(Error::Interrupted)));
 }
+
+#[test]
+fn a_body_narrowed_to_a_tile_has_the_chords_of_the_whole_body() {
+    // From afar, from close by and from within; tiles that the body covers, crosses and hardly touches.
+    let mut chords = [0, 0];
+    for source_mm in [1000.0, 60.0, 10.0] {
+        let beam = format!(
+            "[beam]\nsad_mm = {source_mm}\nsdd_mm = {}\ngantry_deg = [0, 37]\ncouch_deg = 20",
+            source_mm + 70.0
+        );
+        let text =
+            nested_balls(48).replace("[beam]", &beam).replace("kind = \"parallel\"", "kind = \"cone\"");
+        let scene = scene(&text).expect("a scene");
+        for (view, organ) in
+            scene.beam.views().expect("views").iter().flat_map(|v| scene.organs.iter().map(move |o| (v, o)))
+        {
+            for tile in 0..36 {
+                let (first_column, first_row) = (8 * (tile % 6), 8 * (tile / 6));
+                let (columns, rows) = (first_column..first_column + 8, first_row..first_row + 8);
+                let frustum = view.frustum(columns.clone(), rows.clone());
+                let mut narrowed = organ.body.narrowed(|bounds| !frustum.misses(bounds));
+                let (mut of_tile, mut of_body) = (Vec::new(), Vec::new());
+                for (column, row) in rows.flat_map(|r| columns.clone().map(move |c| (c, r))) {
+                    let ray = view.segment(column, row);
+                    narrowed.chords_of_segment(&ray, &mut of_tile);
+                    organ.body.chords_of_segment(&ray, &mut of_body);
+                    let length = |parts: &[Interval]| parts.iter().map(Interval::length).sum::<f64>();
+                    // Where planes meet on the ray, the one left out may have been nearer by rounding.
+                    let apart = (length(&of_tile) - length(&of_body)).abs();
+                    assert!(apart < 1e-12, "{} from {source_mm} mm at {column}, {row}: {apart}", organ.name);
+                    chords[usize::from(of_body.is_empty())] += 1;
+                }
+            }
+        }
+    }
+    assert!(chords.iter().all(|&n| n > 1000), "hits and misses: {chords:?}");
+}

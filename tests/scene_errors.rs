@@ -96,3 +96,14 @@ fn sizes_that_overflow_are_refused_before_memory_is() {
     assert!(message.contains("beam"), "{message}");
     assert_eq!(line, line_of("pixels"));
 }
+
+#[test]
+fn densities_that_no_matter_has_are_refused_at_their_line() {
+    for density in ["-1.0", "nan", "inf", "1e308"] {
+        let said = format!("density_g_cm3 = {density}\n");
+        let text = nested_balls(16).replace("inside = \"outer\"\n", &format!("inside = \"outer\"\n{said}"));
+        let (message, line) = complaints(&text).remove(0);
+        assert!(message.contains("is no density"), "{density}: {message}");
+        assert_eq!(line, text.lines().position(|l| l.contains("density")).map(|i| i + 1));
+    }
+}

@@ -22,6 +22,7 @@ pub fn run(command: &PhantomCommand, session: &Session, out: &mut dyn Write) -> 
         PhantomCommand::Export { name, folder } => {
             let phantom = phantoms::find(name)?;
             let scene = Scene::phantom(name)?;
+            session.begin_writing();
             let file = export(&scene, phantom.toml, folder)?;
             session.remark(&format!("wrote {} and {} meshes beside it", file.display(), scene.organs.len()));
             Ok(())

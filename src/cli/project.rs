@@ -28,6 +28,7 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
     let noise = args.photons.photons.map(|n| PhotonNoise::new(n, args.photons.seed)).transpose()?;
     let products = products(args);
     let projector = Projector::new(&scene, wanted(&products), noise)?;
+    session.begin_writing();
     create_folder(&args.output)?;
     stages.end("load");
 

@@ -9,13 +9,18 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 /// One run of the program.
 pub struct Session {
     cancel: Arc<AtomicBool>,
+    writes: Arc<AtomicBool>,
     talks: bool,
 }
 
 impl Session {
     /// A session that talks to a terminal on standard error unless told to be quiet.
     pub fn new(quiet: bool) -> Self {
-        Self { cancel: Arc::default(), talks: !quiet && std::io::stderr().is_terminal() }
+        Self {
+            cancel: Arc::default(),
+            writes: Arc::default(),
+            talks: !quiet && std::io::stderr().is_terminal(),
+        }
     }
 
     /// The flag that stops the run's work when set.
@@ -23,10 +28,16 @@ impl Session {
         &self.cancel
     }
 
-    /// What to do when the user asks to stop.
-    pub fn canceller(&self) -> impl Fn() + Send + 'static {
-        let cancel = Arc::clone(&self.cancel);
-        move || cancel.store(true, Ordering::Relaxed)
+    /// Tells that from now on files are written, so that the run must be let come to a stop by itself.
+    pub fn begin_writing(&self) {
+        self.writes.store(true, Ordering::Relaxed);
+    }
+
+    /// What to do when the user asks to stop; tells whether to leave the program at once. So it is while no file is
+    /// being written (scenes may take long to load), and when the user asks a second time.
+    pub fn canceller(&self) -> impl Fn() -> bool + Send + 'static {
+        let (cancel, writes) = (Arc::clone(&self.cancel), Arc::clone(&self.writes));
+        move || cancel.swap(true, Ordering::Relaxed) || !writes.load(Ordering::Relaxed)
     }
 
     /// A progress bar over `total` of `unit`, on a terminal only.
@@ -45,5 +56,21 @@ impl Session {
             // A terminal that is gone has nobody to tell.
             let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("{text}\n"));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_is_left_at_once_before_it_writes_and_when_asked_twice() {
+        let (loading, writing) = (Session::new(true), Session::new(true));
+        writing.begin_writing();
+        assert!(loading.canceller()());
+        let ask = writing.canceller();
+        assert!(!ask());
+        assert!(writing.cancel().load(Ordering::Relaxed));
+        assert!(ask());
     }
 }

@@ -6,11 +6,13 @@
 //!                                     not manifold)                                          notice)
 //! ```
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 
 use super::boxtree::BoxTree;
 use super::fault::{MeshFault, Notice};
-use super::inside::{Side, side_of_surface, winding_around};
+use super::inside::{Side, crossings_ahead, side_of_surface};
 use super::topology::{Components, Edges};
 use super::{Bounds, TriMesh};
 
@@ -80,8 +82,13 @@ impl ClosedMesh {
 
     /// One face of each component: the first in the mesh's order.
     pub fn first_faces(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.component_count)
-            .filter_map(|c| self.components.iter().position(|&of_face| of_face as usize == c))
+        // Components are numbered in the order of their first faces.
+        let mut next = 0;
+        self.components.iter().enumerate().filter_map(move |(face, &component)| {
+            let is_first = component == next;
+            next += u32::from(is_first);
+            is_first.then_some(face)
+        })
     }
 
     /// The number of handles of a surface of one component: 0 for a ball, 1 for a torus.
@@ -121,54 +128,96 @@ impl ClosedMesh {
 
     /// Makes solids look outward and cavities inward.
     fn turn_outward(&mut self, notices: &mut Vec<Notice>) -> Result<(), MeshFault> {
-        let volumes = self.component_volumes();
-        let smallest = SMALLEST_FILL * self.bounds().size().max_element().powi(3);
-        if let Some(flat) = volumes.iter().position(|v| v.abs() <= smallest) {
-            return Err(MeshFault::Flat { component: flat + 1, of: self.component_count });
+        let of = self.component_count;
+        let pieces = self.pieces();
+        if let Some(flat) = pieces.iter().position(Piece::is_flat) {
+            return Err(MeshFault::Flat { component: flat + 1, of });
         }
-        let depths: Vec<usize> = (0..self.component_count).map(|c| self.component_depth(c)).collect();
-        let is_wrong = |c: usize| (volumes[c] > 0.0) != (depths[c].is_multiple_of(2));
-        let wrong: Vec<usize> = (0..self.component_count).filter(|&c| is_wrong(c)).collect();
-        if wrong.is_empty() {
+        let around: Vec<Vec<usize>> = (0..of).map(|c| self.enclosing(c, &pieces[c])).collect();
+        let is_wrong: Vec<bool> =
+            (0..of).map(|c| (pieces[c].volume > 0.0) != around[c].len().is_multiple_of(2)).collect();
+        // Solid and cavity may both look the wrong way, as in a mirrored file. If only one does, nobody can tell
+        // whether it is turned or a solid within a solid.
+        if let Some(inner) = (0..of).find(|&c| around[c].iter().any(|&o| is_wrong[o] != is_wrong[c])) {
+            return Err(MeshFault::OverlappingComponents { component: inner + 1, of });
+        }
+        let components = is_wrong.iter().filter(|&&wrong| wrong).count();
+        if components == 0 {
             return Ok(());
         }
-        let everything_is_inside_out = wrong.len() == self.component_count;
-        if !everything_is_inside_out && let Some(&inner) = wrong.iter().find(|&&c| depths[c] > 0) {
-            return Err(MeshFault::OverlappingComponents { component: inner + 1, of: self.component_count });
-        }
         for face in 0..self.mesh.faces.len() {
-            if wrong.contains(&(self.components[face] as usize)) {
+            if is_wrong[self.components[face] as usize] {
                 self.edges.turn(&mut self.mesh, face);
             }
         }
-        notices.push(Notice::TurnedInsideOut { components: wrong.len(), of: self.component_count });
+        notices.push(Notice::TurnedInsideOut { components, of });
         Ok(())
     }
 
-    fn component_volumes(&self) -> Vec<f64> {
-        let apex = self.bounds().centre();
-        let mut volumes = vec![0.0; self.component_count];
-        for (triangle, &component) in self.mesh.triangles().zip(&self.components) {
-            let [a, b, c] = triangle.map(|p| p - apex);
-            volumes[component as usize] += a.dot(b.cross(c)) / 6.0;
+    fn pieces(&self) -> Vec<Piece> {
+        let mut pieces =
+            vec![Piece { bounds: Bounds::EMPTY, volume: 0.0, faces: Vec::new() }; self.component_count];
+        for (face, &component) in self.components.iter().enumerate() {
+            let piece = &mut pieces[component as usize];
+            piece.faces.push(face as u32);
+            piece.bounds = self.mesh.triangle(face).into_iter().fold(piece.bounds, Bounds::with);
         }
-        volumes
+        for piece in &mut pieces {
+            let apex = piece.bounds.centre();
+            let cone = |&face: &u32| {
+                let [a, b, c] = self.mesh.triangle(face as usize).map(|p| p - apex);
+                a.dot(b.cross(c)) / 6.0
+            };
+            piece.volume = piece.faces.iter().map(cone).sum();
+        }
+        pieces
     }
 
-    /// How many other components enclose this one.
-    fn component_depth(&self, component: usize) -> usize {
+    /// The other components that enclose this one.
+    ///
+    /// Asked of its corners and face centres in turn, as the first may lie on another's surface. A component all of
+    /// whose places do so is taken to be enclosed by none.
+    fn enclosing(&self, component: usize, piece: &Piece) -> Vec<usize> {
         if self.component_count == 1 {
-            return 0;
+            return Vec::new();
         }
-        let probe = self.components.iter().position(|&c| c as usize == component);
-        let Some(point) = probe.map(|f| self.mesh.triangle(f)[0]) else { return 0 };
-        (0..self.component_count)
-            .filter(|&other| other != component)
-            .filter(|&other| {
-                let of_other = |f: u32| self.components[f as usize] as usize == other;
-                winding_around(&self.mesh, &self.tree, point, of_other).is_some_and(|turns| turns != 0)
-            })
-            .count()
+        let triangles = || piece.faces.iter().map(|&f| self.mesh.triangle(f as usize));
+        let corners = triangles().map(|[corner, _, _]| corner);
+        let centres = triangles().map(|[a, b, c]| (a + b + c) / 3.0);
+        corners.chain(centres).find_map(|place| self.around(component, place)).unwrap_or_default()
+    }
+
+    /// The components but one that wind around a place. `None` if it lies on one of them.
+    fn around(&self, but: usize, place: DVec3) -> Option<Vec<usize>> {
+        let mut turns: BTreeMap<usize, i32> = BTreeMap::new();
+        let mut on_another = false;
+        crossings_ahead(&self.mesh, &self.tree, place, |face, crossing| {
+            let component = self.components[face as usize] as usize;
+            if component != but {
+                match crossing {
+                    Some(winding) => *turns.entry(component).or_default() += winding,
+                    None => on_another = true,
+                }
+            }
+        });
+        (!on_another).then(|| turns.into_iter().filter(|&(_, n)| n != 0).map(|(c, _)| c).collect())
+    }
+}
+
+/// One component of a surface.
+#[derive(Clone)]
+struct Piece {
+    bounds: Bounds,
+    /// Enclosed, mm³; negative if it looks inwards.
+    volume: f64,
+    faces: Vec<u32>,
+}
+
+impl Piece {
+    /// Written so that NaN is flat.
+    fn is_flat(&self) -> bool {
+        let encloses = self.volume.abs() > SMALLEST_FILL * self.bounds.size().max_element().powi(3);
+        !encloses
     }
 }
 
@@ -193,7 +242,7 @@ fn check_numbers(mesh: &TriMesh) -> Result<(), MeshFault> {
     }
 }
 
-/// Coordinates beyond a million kilometres leave the range in which the exact predicates were checked, and hold no
+/// Coordinates beyond a thousand million kilometres leave the range in which the exact predicates were checked, and hold no
 /// patient.
 const LARGEST_COORDINATE_MM: f64 = 1e15;
 
@@ -224,6 +273,16 @@ mod tests {
     use super::super::primitives::{cube, icosphere};
     use super::*;
 
+    fn block(low: [f64; 3], high: [f64; 3]) -> TriMesh {
+        let (low, high) = (DVec3::from(low), DVec3::from(high));
+        cube(1.0).map_vertices(|v| low + (v + 0.5) * (high - low))
+    }
+
+    fn inside_out(mut mesh: TriMesh) -> TriMesh {
+        mesh.faces.iter_mut().for_each(|f| f.swap(0, 1));
+        mesh
+    }
+
     #[test]
     fn a_cube_is_closed_and_holds_its_volume() {
         let (mesh, notices) = ClosedMesh::new(cube(2.0)).expect("closed");
@@ -236,9 +295,7 @@ mod tests {
 
     #[test]
     fn an_inside_out_cube_is_turned_with_a_notice() {
-        let mut inside_out = cube(2.0);
-        inside_out.faces.iter_mut().for_each(|f| f.swap(0, 1));
-        let (mesh, notices) = ClosedMesh::new(inside_out).expect("closed");
+        let (mesh, notices) = ClosedMesh::new(inside_out(cube(2.0))).expect("closed");
         assert_eq!(mesh.volume_mm3(), 8.0);
         assert_eq!(notices, [Notice::TurnedInsideOut { components: 1, of: 1 }]);
     }
@@ -269,16 +326,13 @@ mod tests {
     #[test]
     fn a_cavity_looks_inward_and_its_volume_is_taken_off() {
         let mut shell = cube(4.0);
-        let mut hole = cube(2.0);
-        hole.faces.iter_mut().for_each(|f| f.swap(0, 1));
-        shell.append(&hole);
+        shell.append(&inside_out(cube(2.0)));
         let (mesh, notices) = ClosedMesh::new(shell.clone()).expect("closed");
         assert_eq!(notices, []);
         assert!((mesh.volume_mm3() - 56.0).abs() < 1e-12);
         assert_eq!(mesh.side_of(DVec3::ZERO), Side::Outside);
 
-        shell.faces.iter_mut().for_each(|f| f.swap(0, 1));
-        let (mesh, notices) = ClosedMesh::new(shell).expect("closed");
+        let (mesh, notices) = ClosedMesh::new(inside_out(shell)).expect("closed");
         assert!((mesh.volume_mm3() - 56.0).abs() < 1e-12);
         assert_eq!(notices, [Notice::TurnedInsideOut { components: 2, of: 2 }]);
     }
@@ -288,6 +342,48 @@ mod tests {
         let mut nested = cube(4.0);
         nested.append(&cube(2.0));
         assert!(matches!(ClosedMesh::new(nested), Err(MeshFault::OverlappingComponents { .. })));
+    }
+
+    #[test]
+    fn a_component_against_the_wall_of_another_is_still_seen_to_lie_in_it() {
+        let room = || block([0.0; 3], [4.0; 3]);
+        let mut hollow = room();
+        hollow.append(&inside_out(block([0.0, 1.0, 1.0], [2.0, 3.0, 3.0])));
+        let (mesh, notices) = ClosedMesh::new(hollow).expect("closed");
+        assert_eq!(notices, []);
+        assert!((mesh.volume_mm3() - 56.0).abs() < 1e-12);
+
+        let mut doubled = room();
+        doubled.append(&block([0.0, 1.0, 1.0], [2.0, 3.0, 3.0]));
+        let refused = MeshFault::OverlappingComponents { component: 2, of: 2 };
+        assert_eq!(ClosedMesh::new(doubled).err(), Some(refused));
+    }
+
+    #[test]
+    fn a_solid_inside_a_solid_is_refused_also_if_both_are_inside_out() {
+        let mut nested = cube(4.0);
+        nested.append(&cube(2.0));
+        let refused = MeshFault::OverlappingComponents { component: 2, of: 2 };
+        assert_eq!(ClosedMesh::new(inside_out(nested)).err(), Some(refused));
+    }
+
+    #[test]
+    fn each_solid_is_turned_with_its_own_cavity_only() {
+        let mut shell = cube(4.0);
+        shell.append(&inside_out(cube(2.0)));
+        let mut two = shell.clone();
+        two.append(&inside_out(shell).map_vertices(|v| v + 10.0));
+        let (mesh, notices) = ClosedMesh::new(two).expect("closed");
+        assert!((mesh.volume_mm3() - 112.0).abs() < 1e-11);
+        assert_eq!(notices, [Notice::TurnedInsideOut { components: 2, of: 4 }]);
+        assert_eq!(mesh.first_faces().collect::<Vec<_>>(), [0, 12, 24, 36]);
+    }
+
+    #[test]
+    fn a_speck_beside_a_large_body_is_not_flat() {
+        let mut mesh = cube(2000.0);
+        mesh.append(&cube(0.05).map_vertices(|v| v + 3000.0));
+        assert_eq!(ClosedMesh::new(mesh).expect("closed").0.component_count(), 2);
     }
 
     #[test]

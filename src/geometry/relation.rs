@@ -1,7 +1,7 @@
 //! How two closed surfaces lie to each other, and whether one crosses itself.
 //!
-//! Whether faces meet is decided by exact signs. Where they do, probes (vertices, face centres, the middles of edge
-//! pieces between crossings, a point inside each component) tell contact from crossing: bodies whose flat faces
+//! Whether faces meet is decided by exact signs. Where they do, probes (vertices, a point of each face, the middles of
+//! edge pieces between crossings, a point inside each component) tell contact from crossing: bodies whose flat faces
 //! lie on each other touch, bodies that share a volume deeper than rounding explains cross.
 
 use std::collections::BTreeMap;
@@ -41,11 +41,15 @@ pub fn relation(a: &ClosedMesh, b: &ClosedMesh) -> Relation {
     let contact = surface_contact(a, b);
     let tolerance =
         rounding_tolerance_mm(a.mesh().vertices.iter()) + rounding_tolerance_mm(b.mesh().vertices.iter());
-    let a_in_b = Spread::of(probes(a, contact.surfaces_meet, &contact.on_edges_of_a), b, tolerance);
-    let b_in_a = Spread::of(probes(b, contact.surfaces_meet, &contact.on_edges_of_b), a, tolerance);
+    let a_in_b = Spread::of(&Probes::of(a, contact.surfaces_meet, &contact.on_edges_of_a), b, tolerance);
+    let b_in_a = Spread::of(&Probes::of(b, contact.surfaces_meet, &contact.on_edges_of_b), a, tolerance);
 
     let share_volume = !a_in_b.inside.is_empty() || !b_in_a.inside.is_empty();
-    match (share_volume, a_in_b.reaches_out, b_in_a.reaches_out) {
+    // On the other side of a surface of `b` that runs within `a`, `a` is out of `b`: a ball that fills a cavity and
+    // part of the wall around it has not one probe out of the shell.
+    let a_reaches_out = a_in_b.reaches_out || b_in_a.surface_runs_within;
+    let b_reaches_out = b_in_a.reaches_out || a_in_b.surface_runs_within;
+    match (share_volume, a_reaches_out, b_reaches_out) {
         (false, ..) => Relation::Disjoint,
         (true, false, true) => Relation::Inside,
         (true, true, false) => Relation::Around,
@@ -116,42 +120,55 @@ fn surface_contact(a: &ClosedMesh, b: &ClosedMesh) -> Contact {
 }
 
 /// Points of a body to be held against another: a few if the surfaces do not meet, many if they do.
-fn probes(body: &ClosedMesh, surfaces_meet: bool, crossings: &EdgeCrossings) -> Vec<DVec3> {
-    let mesh = body.mesh();
-    let mut points = one_vertex_per_component(body);
-    if !surfaces_meet {
-        return points;
+struct Probes {
+    on_surface: Vec<DVec3>,
+    within: Vec<DVec3>,
+}
+
+impl Probes {
+    fn of(body: &ClosedMesh, surfaces_meet: bool, crossings: &EdgeCrossings) -> Self {
+        let mesh = body.mesh();
+        let mut on_surface = one_vertex_per_component(body);
+        if !surfaces_meet {
+            return Self { on_surface, within: Vec::new() };
+        }
+        on_surface.extend(&mesh.vertices);
+        on_surface.extend(mesh.triangles().map(odd_place));
+        for (&[u, v], places) in crossings {
+            let (start, end) = (mesh.vertices[u as usize], mesh.vertices[v as usize]);
+            let mut stops = places.clone();
+            stops.sort_by(|p, q| (p - start).length_squared().total_cmp(&(q - start).length_squared()));
+            stops.insert(0, start);
+            stops.push(end);
+            on_surface.extend(stops.windows(2).map(|w| w[0].midpoint(w[1])));
+        }
+        Self { on_surface, within: points_inside(body) }
     }
-    points.extend(points_inside(body));
-    points.extend(&mesh.vertices);
-    points.extend(mesh.triangles().map(|[a, b, c]| (a + b + c) / 3.0));
-    for (&[u, v], places) in crossings {
-        let (start, end) = (mesh.vertices[u as usize], mesh.vertices[v as usize]);
-        let mut stops = places.clone();
-        stops.sort_by(|p, q| (p - start).length_squared().total_cmp(&(q - start).length_squared()));
-        stops.insert(0, start);
-        stops.push(end);
-        points.extend(stops.windows(2).map(|w| w[0].midpoint(w[1])));
-    }
-    points
+}
+
+/// A place in a triangle at no simple fraction of it: in bodies drawn on a grid, the centre of one's face lies on
+/// the faces of others.
+fn odd_place([a, b, c]: [DVec3; 3]) -> DVec3 {
+    const SHARES: [f64; 3] = [0.4142, 0.3247, 0.2611];
+    SHARES[0] * a + SHARES[1] * b + SHARES[2] * c
 }
 
 fn one_vertex_per_component(body: &ClosedMesh) -> Vec<DVec3> {
     body.first_faces().map(|f| body.mesh().triangle(f)[0]).collect()
 }
 
-/// A point well inside each solid component: half way from its largest face to where the inward normal leaves.
+/// A point well inside each solid component, below its first face.
 fn points_inside(body: &ClosedMesh) -> Vec<DVec3> {
     let mesh = body.mesh();
     body.first_faces()
         .filter_map(|f| {
             let [a, b, c] = mesh.triangle(f);
             let inward = -(b - a).cross(c - a).normalize_or_zero();
-            let centre = (a + b + c) / 3.0;
+            let start = odd_place([a, b, c]);
             // Halving from the body's size always ends inside or at the face itself.
             let reach = body.bounds().diagonal();
             (0..40)
-                .map(|k| centre + inward * reach * 0.5f64.powi(k))
+                .map(|k| start + inward * reach * 0.5f64.powi(k))
                 .find(|&p| body.side_of(p) == Side::Inside)
         })
         .collect()
@@ -161,25 +178,33 @@ fn points_inside(body: &ClosedMesh) -> Vec<DVec3> {
 struct Spread {
     /// Those that lie in it deeper than the tolerance.
     inside: Vec<DVec3>,
+    /// Whether one of these is on the probed body's surface.
+    surface_runs_within: bool,
     /// Whether some lie out of it farther than the tolerance.
     reaches_out: bool,
 }
 
 impl Spread {
-    fn of(probes: Vec<DVec3>, body: &ClosedMesh, tolerance_mm: f64) -> Self {
-        let mut spread = Self { inside: Vec::new(), reaches_out: false };
-        for p in probes {
+    fn of(probes: &Probes, body: &ClosedMesh, tolerance_mm: f64) -> Self {
+        let mut spread = Self { inside: Vec::new(), surface_runs_within: false, reaches_out: false };
+        spread.add(&probes.on_surface, body, tolerance_mm);
+        spread.surface_runs_within = !spread.inside.is_empty();
+        spread.add(&probes.within, body, tolerance_mm);
+        spread
+    }
+
+    fn add(&mut self, probes: &[DVec3], body: &ClosedMesh, tolerance_mm: f64) {
+        for &p in probes {
             match body.side_of(p) {
                 Side::On => {}
-                Side::Inside if body.distance_mm(p) > tolerance_mm => spread.inside.push(p),
+                Side::Inside if body.distance_mm(p) > tolerance_mm => self.inside.push(p),
                 Side::Inside => {}
                 // One far enough out tells all; distances are the costly part.
                 Side::Outside => {
-                    spread.reaches_out = spread.reaches_out || body.distance_mm(p) > tolerance_mm;
+                    self.reaches_out = self.reaches_out || body.distance_mm(p) > tolerance_mm;
                 }
             }
         }
-        spread
     }
 
     /// The depth and the place of the deepest probe, mm.
@@ -256,6 +281,51 @@ mod tests {
         shell.append(&hole);
         let ball = closed(icosphere(2).map_vertices(|v| 5.0 * v));
         assert_eq!(relation(&closed(shell), &ball), Relation::Disjoint);
+    }
+
+    #[test]
+    fn a_ball_that_fills_a_cavity_and_half_its_wall_crosses_the_shell() {
+        let mut skull = icosphere(2).map_vertices(|v| 10.0 * v);
+        let mut hole = icosphere(2).map_vertices(|v| 8.0 * v);
+        hole.faces.iter_mut().for_each(|f| f.swap(0, 1));
+        skull.append(&hole);
+        let (skull, brain) = (closed(skull), closed(icosphere(2).map_vertices(|v| 9.0 * v)));
+        assert!(is_crossing(relation(&skull, &brain)));
+        assert!(is_crossing(relation(&brain, &skull)));
+    }
+
+    /// A block of 6 × 5 × 1 with a notch of 2 × 3 × 1, whose walls' diagonals are chosen for the test below.
+    fn notched_block() -> TriMesh {
+        let outline = [(-3, -2), (3, -2), (3, 3), (1, 3), (1, 0), (-1, 0), (-1, 3), (-3, 3)];
+        let corner = |z: f64| outline.map(|(x, y)| DVec3::new(f64::from(x), f64::from(y), z));
+        let caps = [[0, 1, 4], [1, 2, 3], [1, 3, 4], [0, 4, 5], [0, 5, 6], [0, 6, 7]];
+        let mut faces: Vec<[u32; 3]> =
+            caps.iter().flat_map(|&[a, b, c]| [[a, c, b], [a + 8, b + 8, c + 8]]).collect();
+        for i in 0..8 {
+            let j = (i + 1) % 8;
+            let is_wall_of_the_notch = i == 3 || i == 5;
+            faces.extend(match is_wall_of_the_notch {
+                true => [[i, j, i + 8], [j, j + 8, i + 8]],
+                false => [[i, j, j + 8], [i, j + 8, i + 8]],
+            });
+        }
+        TriMesh { vertices: [corner(0.0), corner(1.0)].concat(), faces }
+    }
+
+    #[test]
+    fn a_bar_on_the_grid_of_a_notched_block_crosses_it_though_edges_meet_edges_only() {
+        // The bar's vertices and face centres all lie on the block's surface, its diagonals cross the block's.
+        let notched = closed(notched_block());
+        for mirrored in [false, true] {
+            let mut bar = cube(1.0).map_vertices(|v| {
+                let z = if mirrored { -v.z } else { v.z };
+                DVec3::new(6.0 * v.x, v.y + 0.5, z + 0.5)
+            });
+            if mirrored {
+                bar.faces.iter_mut().for_each(|f| f.swap(0, 1));
+            }
+            assert!(is_crossing(relation(&notched, &closed(bar))), "{mirrored}");
+        }
     }
 
     #[test]

@@ -6,6 +6,7 @@ use ::image::{ImageBuffer, Luma, Pixel};
 pub use ::image::{RgbImage, RgbaImage};
 use glam::DVec3;
 
+use crate::scene::panel::MAX_SKEW_DEG;
 use crate::{Error, Result};
 
 /// An image of single-precision numbers, the first row at the top: a transmission, a projection value p, a length
@@ -66,7 +67,7 @@ pub(super) fn write_little_endian(image: &FloatImage, out: &mut dyn Write) -> io
 /// ```text
 /// origin ──► column axis (pixel to pixel within a row)
 ///   │
-///   ▼ row axis (row to row)              normal = column axis × row axis
+///   ▼ row axis (row to row)              normal along column axis × row axis
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geometry {
@@ -77,12 +78,12 @@ pub struct Geometry {
 
 impl Geometry {
     /// The geometry of an image whose first pixel has its centre at `origin_mm`, whose columns advance along
-    /// `column_axis` and rows along `row_axis`, unit vectors at a right angle. `spacing_mm` is the distance of
-    /// neighbouring pixel centres along the column axis, along the row axis, and the slice's thickness.
+    /// `column_axis` and rows along `row_axis`, unit vectors at a right angle, give or take the skew that calibrated
+    /// detectors have ([`MAX_SKEW_DEG`]). `spacing_mm` is the distance of neighbouring pixel centres along the column
+    /// axis, along the row axis, and the slice's thickness.
     ///
     /// # Errors
-    /// If a number is not finite, a spacing not positive, an axis not of length 1 or the axes not at a right
-    /// angle, within 10⁻⁹.
+    /// If a number is not finite, a spacing not positive, an axis not of length 1 within 10⁻⁹ or the axes more skewed.
     pub fn new(origin_mm: DVec3, column_axis: DVec3, row_axis: DVec3, spacing_mm: [f64; 3]) -> Result<Self> {
         /// A micrometre over a kilometre; unit vectors made in f64 are exact to some 10⁻¹⁶.
         const AXIS_TOLERANCE: f64 = 1e-9;
@@ -96,16 +97,17 @@ impl Geometry {
                 "give three positive distances in mm",
             ));
         }
-        let deviations =
-            [column_axis.length() - 1.0, row_axis.length() - 1.0, column_axis.dot(row_axis)].map(f64::abs);
+        let is_unit = |axis: DVec3| (axis.length() - 1.0).abs() <= AXIS_TOLERANCE;
+        let most_skewed = MAX_SKEW_DEG.to_radians().sin() + AXIS_TOLERANCE;
         // Written so that NaN is refused as well.
-        if !deviations.iter().all(|d| *d <= AXIS_TOLERANCE) {
+        if !(is_unit(column_axis) && is_unit(row_axis) && column_axis.dot(row_axis).abs() <= most_skewed) {
             return Err(refused(
                 format!("the axes {column_axis} and {row_axis} are not unit vectors at a right angle"),
                 "give directions of length 1 that are perpendicular",
             ));
         }
-        Ok(Self { origin_mm, axes: [column_axis, row_axis, column_axis.cross(row_axis)], spacing_mm })
+        let normal = column_axis.cross(row_axis).normalize();
+        Ok(Self { origin_mm, axes: [column_axis, row_axis, normal], spacing_mm })
     }
 
     /// The centre of the first pixel, mm.
@@ -113,7 +115,7 @@ impl Geometry {
         self.origin_mm
     }
 
-    /// Unit vectors: along which columns advance, along which rows advance, and their cross product.
+    /// Unit vectors: along which columns advance, along which rows advance, and the normal, columns × rows.
     pub fn axes(&self) -> [DVec3; 3] {
         self.axes
     }
@@ -160,7 +162,8 @@ mod tests {
         let geometry = Geometry::new(z, x, DVec3::NEG_Z, [1.0, 2.0, 3.0]).expect("a geometry");
         assert_eq!(geometry.axes()[2], DVec3::Y);
         assert!(!good(z, 1.001 * x, y, [1.0; 3]));
-        assert!(!good(z, x, (y + 0.001 * x).normalize(), [1.0; 3]));
+        assert!(good(z, x, (y + 0.017 * x).normalize(), [1.0; 3]), "a calibrated detector's skew");
+        assert!(!good(z, x, (y + 0.018 * x).normalize(), [1.0; 3]));
         assert!(!good(z, x, DVec3::NAN, [1.0; 3]));
         assert!(!good(DVec3::INFINITY, x, y, [1.0; 3]));
         for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {

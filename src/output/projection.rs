@@ -1,5 +1,6 @@
 //! The files of one projected view.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
@@ -106,13 +107,21 @@ pub fn write(
 
 /// A file name for each organ: its own name where that is safe everywhere, numbered where two would be alike.
 pub fn file_stems(scene: &Scene) -> Vec<String> {
-    let mut stems: Vec<String> = Vec::new();
-    for (i, organ) in scene.organs.iter().enumerate() {
-        let stem = safe_name(&organ.name);
-        let is_taken = stems.iter().any(|other| other.to_lowercase() == stem.to_lowercase());
-        stems.push(if is_taken { format!("{stem}-{}", i + 1) } else { stem });
-    }
-    stems
+    distinct(scene.organs.iter().map(|organ| safe_name(&organ.name)))
+}
+
+/// Names of which no two are alike, also where upper and lower case are the same.
+fn distinct(names: impl Iterator<Item = String>) -> Vec<String> {
+    let mut taken = HashSet::new();
+    let mut take = |name: &String| taken.insert(name.to_lowercase());
+    names
+        .enumerate()
+        .map(|(i, name)| match take(&name) {
+            true => name,
+            // A numbered name may itself be taken, by an organ that is called so.
+            false => (i + 1..).map(|n| format!("{name}-{n}")).find(&mut take).unwrap_or(name),
+        })
+        .collect()
 }
 
 /// `name` with everything but letters, digits, `-` and `_` replaced, so that it is one file name on every system.
@@ -217,5 +226,33 @@ impl ViewWriter<'_> {
             files.push(record(file, bytes));
         }
         Ok(files)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::scene::{Panel, Pose};
+
+    #[test]
+    fn names_that_would_be_one_file_are_numbered_and_stay_apart() {
+        let names = ["a b", "a_b-3", "a?b", "A_B", "kidney"].map(safe_name);
+        assert_eq!(
+            distinct(names.into_iter()),
+            ["a_b", "a_b-3", "a_b-4", "A_B-5", "kidney"].map(String::from)
+        );
+    }
+
+    #[test]
+    fn a_calibrated_view_with_skewed_pixels_has_a_geometry() {
+        let row_step = DVec3::new(0.005, 0.0, -1.0).normalize();
+        let panel = Panel::centred(DVec3::new(0.0, 500.0, 0.0), DVec3::X, row_step, [4, 3]);
+        let view =
+            View::cone(DVec3::new(0.0, -1000.0, 0.0), panel, Pose::Matrix { index: 0 }).expect("a view");
+        let geometry = geometry(&view).expect("a geometry");
+        assert_eq!(geometry.axes()[..2], [DVec3::X, row_step]);
+        assert!((geometry.axes()[2] - DVec3::Y).length() < 1e-15);
     }
 }

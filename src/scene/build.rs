@@ -22,6 +22,8 @@ const DEFAULT_ENERGY_KEV: f64 = 60.0;
 const DEFAULT_COLOUR: &str = "#808080";
 /// See [`DEFAULT_COLOUR`].
 const DEFAULT_OPACITY: f64 = 0.5;
+/// Forty times the densest matter on Earth. Beyond some 1e300, attenuation would overflow.
+const MAX_DENSITY_G_CM3: f64 = 1000.0;
 /// A scene file longer than this is no scene file.
 const MAX_SCENE_BYTES: u64 = 16 << 20;
 /// More organs than any phantom has; their pairs are all compared.
@@ -139,12 +141,12 @@ fn organ(spec: &OrganSpec, index: usize, text: &SceneText, folder: &Folder) -> R
     };
     let material = Material::named(&spec.material).map_err(|e| at("material", e))?;
     let density_g_cm3 = match spec.density_g_cm3 {
-        Some(d) if d.is_finite() && d >= 0.0 => d,
+        Some(d) if (0.0..=MAX_DENSITY_G_CM3).contains(&d) => d,
         Some(d) => {
             let error = Error::input(
                 "density_g_cm3",
                 format!("{d} is no density"),
-                "give a density in g/cm³, 0 or more",
+                format!("give a density in g/cm³, from 0 to {MAX_DENSITY_G_CM3}"),
             );
             return Err(at("density_g_cm3", error));
         }

@@ -7,7 +7,8 @@
 //! ```
 //!
 //! What nobody asked for is not computed: entry order without colour, organs without attenuation if only attenuation
-//! is wanted. A pixel's values depend on its ray alone, so images are the same bits for any number of threads.
+//! is wanted. A pixel's values depend on its ray and its tile alone (on the tile by a rounding, see
+//! `exact::clip::NarrowedClipper`), so images are the same bits for any number of threads.
 
 mod sweep;
 mod tile;
