@@ -14,12 +14,12 @@
 //! coefficients cm⁻¹; points are in the patient's LPS frame (+x left, +y back, +z head).
 //!
 //! ```
-//! use chordfield::modes::{Control, project::{Projector, Wanted}};
+//! use chordfield::modes::{Control, project::{Method, Projector, Wanted}};
 //! use chordfield::scene::Scene;
 //!
 //! let scene = Scene::phantom("calibration")?;
 //! let wanted = Wanted { lengths: true, attenuation: true, colour: false };
-//! let projector = Projector::new(&scene, wanted, None)?;
+//! let projector = Projector::new(&scene, wanted, None, Method::Exact)?;
 //! for (i, view) in scene.beam.views()?.iter().enumerate() {
 //!     let projection = projector.project(view, i as u64, &Control::none())?;
 //!     let longest = projection.own_length_mm(0).into_iter().fold(0.0, f32::max);
@@ -28,13 +28,16 @@
 //! # Ok::<(), chordfield::Error>(())
 //! ```
 
+pub mod attributes;
 pub mod cli;
 pub mod error;
 pub mod exact;
 pub mod geometry;
+pub mod linespace;
 pub mod modes;
 pub mod output;
 pub mod physics;
+pub mod ritree;
 pub mod scene;
 
 pub use error::{Error, Result};

@@ -24,10 +24,14 @@ pub struct PlanePair {
 
 impl PlanePair {
     /// +X, −X, +Y, −Y, +Z, −Z.
-    pub const ALL: [Self; 6] = {
-        let pair = |axis, reversed| Self { axis, reversed };
-        [pair(0, false), pair(0, true), pair(1, false), pair(1, true), pair(2, false), pair(2, true)]
-    };
+    pub const ALL: [Self; 6] = [
+        Self { axis: 0, reversed: false },
+        Self { axis: 0, reversed: true },
+        Self { axis: 1, reversed: false },
+        Self { axis: 1, reversed: true },
+        Self { axis: 2, reversed: false },
+        Self { axis: 2, reversed: true },
+    ];
 
     /// Its place in [`ALL`](Self::ALL).
     pub fn index(self) -> usize {

@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use chordfield::Error;
 use chordfield::geometry::Interval;
 use chordfield::modes::Control;
-use chordfield::modes::project::{Projection, Projector, Wanted};
+use chordfield::modes::project::{Method, Projection, Projector, Wanted};
 use chordfield::physics::PhotonNoise;
 use chordfield::scene::Scene;
 use common::{nested_balls, scene};
@@ -16,7 +16,7 @@ const EVERYTHING: Wanted = Wanted { lengths: true, attenuation: true, colour: tr
 
 fn project(scene: &Scene, wanted: Wanted) -> Projection {
     let view = &scene.beam.views().expect("a beam")[0];
-    Projector::new(scene, wanted, None)
+    Projector::new(scene, wanted, None, Method::Exact)
         .and_then(|p| p.project(view, 0, &Control::none()))
         .expect("a projection")
 }
@@ -29,7 +29,7 @@ fn sum(values: &[f32]) -> f64 {
 fn parallel_lengths_times_area_are_volumes_at_every_angle() {
     let scene_text = nested_balls(300).replace("[beam]", "[beam]\ngantry_deg = [0, 37, 90]\ncouch_deg = 20");
     let scene = scene(&scene_text).expect("a scene");
-    let projector = Projector::new(&scene, EVERYTHING, None).expect("a projector");
+    let projector = Projector::new(&scene, EVERYTHING, None, Method::Exact).expect("a projector");
     for view in scene.beam.views().expect("views") {
         let projection = projector.project(&view, 0, &Control::none()).expect("a projection");
         for (i, organ) in scene.organs.iter().enumerate() {
@@ -86,7 +86,8 @@ fn images_are_the_same_bits_for_one_two_and_eight_threads() {
     let with_threads = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         let projection = pool.install(|| {
-            Projector::new(&scene, EVERYTHING, noise).and_then(|p| p.project(view, 0, &Control::none()))
+            Projector::new(&scene, EVERYTHING, noise, Method::Exact)
+                .and_then(|p| p.project(view, 0, &Control::none()))
         });
         let projection = projection.expect("a projection");
         let bits = |values: Vec<f32>| values.into_iter().map(f32::to_bits).collect::<Vec<_>>();
@@ -134,7 +135,7 @@ fn a_cancelled_projection_is_interrupted() {
     let scene = scene(&nested_balls(64)).expect("a scene");
     let view = &scene.beam.views().expect("views")[0];
     let (stop, silent) = (AtomicBool::new(true), |_: u64| {});
-    let projector = Projector::new(&scene, EVERYTHING, None).expect("a projector");
+    let projector = Projector::new(&scene, EVERYTHING, None, Method::Exact).expect("a projector");
     let stopped = projector.project(view, 0, &Control::new(&stop, &silent));
     assert!(matches!(stopped, Err(Error::Interrupted)));
 }

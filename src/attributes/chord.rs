@@ -3,14 +3,23 @@
 use glam::DVec3;
 
 use crate::exact::Body;
-use crate::geometry::Interval;
+use crate::geometry::{Interval, Line};
 use crate::linespace::{Cell, LinePoint, LineSpace, PlanePair};
 use crate::ritree::Attribute;
 
-/// The length of a line's intersection with one body.
+/// A chord, as samples hold it. f32: its rounding, 6e-8 of the value, is far below any useful threshold.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Chord {
+    /// Its length, mm.
+    pub length_mm: f32,
+    /// Where it begins on the way from the plane at 0 to the plane at 1 of the dominant axis, box units.
+    pub entry: f32,
+}
+
+/// The chord of a line in one convex body.
 ///
-/// Samples are exact chords, kept as f32: their rounding, 6e-8 of the length, is far below any useful threshold. The
-/// distance of two chords is measured in half the longest side of the body's box, the unit of the distance threshold.
+/// Samples are exact. The distance of two chords is that of their lengths, in half the longest side of the body's box:
+/// the unit of the distance threshold.
 pub struct ChordLength<'a> {
     body: &'a Body,
     space: LineSpace,
@@ -22,8 +31,9 @@ pub struct ChordLength<'a> {
 const LEAST_SEPARATION: f64 = 1e-12;
 
 impl<'a> ChordLength<'a> {
-    /// The chords of `body`. `None` if its box is flat, which no body's is.
+    /// The chords of `body`. `None` if it is not convex (a line may then have several chords) or its box is flat.
     pub fn new(body: &'a Body) -> Option<Self> {
+        body.convexity().ok()?;
         let space = LineSpace::new(body.bounds())?;
         Some(Self { body, space, unit_mm: 0.5 * body.bounds().size().max_element() })
     }
@@ -32,6 +42,21 @@ impl<'a> ChordLength<'a> {
     pub fn space(&self) -> &LineSpace {
         &self.space
     }
+
+    /// A chord as a stretch of the line it was found for, mm from the line's origin. `None` if it has no length.
+    pub fn stretch(&self, chord: Chord, line: &Line, point: LinePoint) -> Option<Interval> {
+        let [k, ..] = point.pair.axes();
+        // Box coordinate k along the line: o + t·d.
+        let (o, d) = (
+            (line.origin()[k] - self.space.min()[k]) / self.space.size()[k],
+            line.dir()[k] / self.space.size()[k],
+        );
+        let length = f64::from(chord.length_mm);
+        let entry = (f64::from(chord.entry) - o) / d;
+        // Against the axis, the chord is walked from its other end.
+        let start = if d > 0.0 { entry } else { entry - length };
+        Interval::new(start, start + length).filter(|part| part.length() > 0.0)
+    }
 }
 
 /// The classes of patches: a body's surface, and nothing.
@@ -39,16 +64,21 @@ const HIT: u32 = 1;
 const MISS: u32 = 0;
 
 impl Attribute for ChordLength<'_> {
-    /// The chord, mm; `None` if the line misses.
-    type Output = Option<f32>;
+    /// `None` if the line misses.
+    type Output = Option<Chord>;
 
-    fn sample(&self, line: LinePoint) -> Option<f32> {
+    fn sample(&self, point: LinePoint) -> Option<Chord> {
         let mut parts = Vec::new();
-        self.body.chords(&self.space.line_of(line)?, &mut parts);
-        (!parts.is_empty()).then(|| parts.iter().map(Interval::length).sum::<f64>() as f32)
+        let line = self.space.line_of(point)?;
+        self.body.chords(&line, &mut parts);
+        let chord = parts.first()?;
+        let [k, ..] = point.pair.axes();
+        let first = if line.dir()[k] > 0.0 { chord.start() } else { chord.end() };
+        let entry = (line.at(first)[k] - self.space.min()[k]) / self.space.size()[k];
+        Some(Chord { length_mm: chord.length() as f32, entry: entry as f32 })
     }
 
-    fn class(&self, output: &Option<f32>) -> u32 {
+    fn class(&self, output: &Self::Output) -> u32 {
         if output.is_some() { HIT } else { MISS }
     }
 
@@ -56,12 +86,18 @@ impl Attribute for ChordLength<'_> {
         class == MISS
     }
 
-    fn distance(&self, a: &Option<f32>, b: &Option<f32>) -> f64 {
-        (f64::from(a.unwrap_or(0.0)) - f64::from(b.unwrap_or(0.0))).abs() / self.unit_mm
+    fn distance(&self, a: &Self::Output, b: &Self::Output) -> f64 {
+        let length = |chord: &Self::Output| chord.map_or(0.0, |c| f64::from(c.length_mm));
+        (length(a) - length(b)).abs() / self.unit_mm
     }
 
-    fn interpolate(&self, parts: &[(f64, &Option<f32>)]) -> Option<f32> {
-        Some(parts.iter().map(|(w, length)| w * f64::from(length.unwrap_or(0.0))).sum::<f64>() as f32)
+    fn interpolate(&self, parts: &[(f64, &Self::Output)]) -> Self::Output {
+        let (mut length, mut entry) = (0.0, 0.0);
+        for (weight, chord) in parts.iter().filter_map(|(w, chord)| chord.map(|c| (w, c))) {
+            length += weight * f64::from(chord.length_mm);
+            entry += weight * f64::from(chord.entry);
+        }
+        Some(Chord { length_mm: length as f32, entry: entry as f32 })
     }
 
     fn is_symmetric(&self) -> bool {
@@ -89,7 +125,8 @@ impl Attribute for ChordLength<'_> {
             n[j] = b;
             n[k] = at_0 - at_1;
             let n = n / size;
-            self.body.surface().support_mm(n) - n.dot(min) - at_0 < -LEAST_SEPARATION
+            let highest = self.body.surface().farthest_vertex(n, min, f64::NEG_INFINITY);
+            highest.is_some_and(|(height, _)| height - at_0 < -LEAST_SEPARATION)
         })
     }
 }

@@ -81,6 +81,10 @@ pub struct ProjectArgs {
     #[command(flatten)]
     pub photons: PhotonArgs,
 
+    /// How lengths are found.
+    #[command(flatten)]
+    pub method: MethodArgs,
+
     /// The values of p shown as darkest and lightest; found from the image if left out.
     #[arg(long, value_name = "LOW..HIGH", value_parser = parse_window, allow_hyphen_values = true)]
     pub window: Option<[f64; 2]>,
@@ -88,6 +92,45 @@ pub struct ProjectArgs {
     /// Whether much attenuation is shown white, as on a film, or black.
     #[arg(long, value_enum, default_value_t = PolarityArg::BoneWhite)]
     pub polarity: PolarityArg,
+}
+
+/// How lengths are found.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Method")]
+pub struct MethodArgs {
+    /// Every length exactly, or by RI-trees (Atalay & Mount) that interpolate exact samples.
+    #[arg(long, value_enum, default_value_t = MethodArg::Exact)]
+    pub method: MethodArg,
+    /// RI-tree: a cell splits if its middle is interpolated worse than this, in half the longest side of the organ's box.
+    #[arg(long, value_name = "D", default_value_t = 0.05, allow_negative_numbers = true)]
+    pub distance_threshold: f64,
+    /// RI-tree: output directions farther apart than this are not interpolated (chords have none).
+    #[arg(long = "angular-threshold-deg", value_name = "DEG", default_value_t = 30.0)]
+    pub angular_threshold_deg: f64,
+    /// RI-tree: cells of this depth are final.
+    #[arg(long, value_name = "N", default_value_t = 28, value_parser = clap::value_parser!(u32).range(0..=60))]
+    pub max_depth: u32,
+    /// RI-tree: the most that nodes and samples of all trees may hold, megabytes.
+    #[arg(long, value_name = "MB", default_value_t = 100.0)]
+    pub cache_mb: f64,
+    /// RI-tree: the share of the cache that is kept when it is pruned.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.3)]
+    pub prune_keep: f64,
+    /// RI-tree: bodies with fewer face planes are clipped instead.
+    #[arg(long, value_name = "N", default_value_t = 48)]
+    pub tree_planes: usize,
+    /// RI-tree: also write the map of traced pixels: white where any organ was traced, grey where all were interpolated.
+    #[arg(long)]
+    pub map: bool,
+}
+
+/// A method as an argument.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum MethodArg {
+    /// Every length exactly.
+    Exact,
+    /// By RI-trees.
+    Ritree,
 }
 
 /// Changes to the scene's `[beam]`.

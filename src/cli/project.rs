@@ -5,18 +5,22 @@ use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
-use super::args::{BeamArgs, BeamKindArg, PhotonArgs, Product, ProjectArgs};
+use super::args::{BeamArgs, BeamKindArg, MethodArg, MethodArgs, PhotonArgs, Product, ProjectArgs};
 use super::{Session, print};
 use crate::error::{Error, Result};
 use crate::modes::Control;
-use crate::modes::project::{Projector, RayCounts, Wanted};
+use crate::modes::project::{Method, Projector, QueryCounts, RayCounts, TreeSettings, Wanted};
 use crate::output::projection::{self, Products};
-use crate::output::sidecar::{Sidecar, Summary, ViewRecord};
+use crate::output::sidecar::{Sidecar, Summary, TreeSummary, ViewRecord};
 use crate::output::{create_folder, json};
 use crate::physics::{PhotonNoise, Spectrum};
+use crate::ritree::Parameters;
 use crate::scene::beam::{BeamKind, BeamSpec, DetectorSpec};
 use crate::scene::ranges::Angles;
 use crate::scene::{Given, Scene, View, phantoms};
+
+/// Rays whose interpolated lengths are held against exact ones in each run.
+const SPOT_CHECK_RAYS: usize = 20_000;
 
 /// Projects a scene and writes what was asked for; the summary goes to `out` as JSON if asked for.
 pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result<()> {
@@ -27,7 +31,8 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
     let labels = labels(&scene.name, &views);
     let noise = args.photons.photons.map(|n| PhotonNoise::new(n, args.photons.seed)).transpose()?;
     let products = products(args);
-    let projector = Projector::new(&scene, wanted(&products), noise)?;
+    let method = method(&args.method)?;
+    let projector = Projector::new(&scene, wanted(&products), noise, method)?;
     session.begin_writing();
     create_folder(&args.output)?;
     stages.end("load");
@@ -37,11 +42,12 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
     bar.set_message(scene.name.clone());
     let advance = |rays| bar.inc(rays);
     let control = Control::new(session.cancel(), &advance);
-    let mut counts = RayCounts::default();
+    let (mut counts, mut queries) = (RayCounts::default(), QueryCounts::default());
     let mut records = Vec::new();
     for (index, (view, label)) in views.iter().zip(&labels).enumerate() {
         let projection = projector.project(view, index as u64, &control)?;
         counts += projection.counts();
+        queries += projection.queries();
         stages.end("project");
         let files = projection::write(&args.output, label, &scene, view, &projection, &products)?;
         control.check()?;
@@ -49,10 +55,13 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
         records.push((view, label.clone(), files));
     }
     bar.finish_and_clear();
+    let ritree = tree_summary(&projector, method, queries, &views);
+    stages.end("check");
 
     let files = records.iter().flat_map(|(_, _, files)| files);
     let summary = Summary {
-        method: "exact",
+        method: if ritree.is_some() { "ritree" } else { "exact" },
+        ritree,
         views: views.len(),
         organs: scene.organs.len(),
         counts,
@@ -151,10 +160,59 @@ fn products(args: &ProjectArgs) -> Products {
         transmission: has(Product::Transmission),
         line_integral: has(Product::P),
         lengths: has(Product::Lengths),
+        map: args.method.map,
         npy: args.npy,
         window: args.window,
         polarity: args.polarity.into(),
     }
+}
+
+/// What the trees did, with their error on a sample of the run's rays.
+fn tree_summary(
+    projector: &Projector,
+    method: Method,
+    queries: QueryCounts,
+    views: &[View],
+) -> Option<TreeSummary> {
+    let Method::RiTree(settings) = method else { return None };
+    let trees = projector.forest()?;
+    Some(TreeSummary {
+        settings,
+        queries,
+        trees,
+        sampled_error: projector.spot_check(views, SPOT_CHECK_RAYS, 1),
+    })
+}
+
+fn method(args: &MethodArgs) -> Result<Method> {
+    let refuse = |name: &str, value: f64, remedy: &str| {
+        Err(Error::input(name, format!("{value} does not serve"), remedy))
+    };
+    if !args.distance_threshold.is_finite() {
+        return refuse("--distance-threshold", args.distance_threshold, "give a finite number");
+    }
+    if !(0.0..=180.0).contains(&args.angular_threshold_deg) {
+        return refuse("--angular-threshold-deg", args.angular_threshold_deg, "give 0 to 180 degrees");
+    }
+    if !(0.0..=1e9).contains(&args.cache_mb) {
+        return refuse("--cache-mb", args.cache_mb, "give megabytes, 0 or more");
+    }
+    if !(0.0..=1.0).contains(&args.prune_keep) {
+        return refuse("--prune-keep", args.prune_keep, "give a share from 0 to 1");
+    }
+    Ok(match args.method {
+        MethodArg::Exact => Method::Exact,
+        MethodArg::Ritree => Method::RiTree(TreeSettings {
+            parameters: Parameters {
+                distance_threshold: args.distance_threshold,
+                angular_threshold_deg: args.angular_threshold_deg,
+                max_depth: args.max_depth,
+            },
+            cache_bytes: (args.cache_mb * 1e6) as usize,
+            kept_share: args.prune_keep,
+            least_planes: args.tree_planes,
+        }),
+    })
 }
 
 fn wanted(products: &Products) -> Wanted {

@@ -113,6 +113,28 @@ impl ClosedMesh {
         side_of_surface(&self.mesh, &self.tree, point)
     }
 
+    /// The greatest height `normal · (vertex − from)` of a vertex above `at_least`, and that vertex. `None` if there is
+    /// none. In the unit of `normal` times mm.
+    pub fn farthest_vertex(&self, normal: DVec3, from: DVec3, at_least: f64) -> Option<(f64, DVec3)> {
+        let best = std::cell::Cell::new((at_least, None));
+        self.tree.visit(
+            |b| {
+                let corner = DVec3::select(normal.cmpge(DVec3::ZERO), b.max, b.min);
+                normal.dot(corner - from) > best.get().0
+            },
+            |face| {
+                for vertex in self.mesh.triangle(face as usize) {
+                    let height = normal.dot(vertex - from);
+                    if height > best.get().0 {
+                        best.set((height, Some(vertex)));
+                    }
+                }
+            },
+        );
+        let (height, vertex) = best.get();
+        vertex.map(|v| (height, v))
+    }
+
     /// The distance from `point` to the surface, mm, in f64.
     pub fn distance_mm(&self, point: DVec3) -> f64 {
         let to_face = |f: usize| super::predicates::squared_distance(point, self.mesh.triangle(f));

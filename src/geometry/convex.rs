@@ -1,6 +1,5 @@
 //! Convex bodies: closed surfaces all of whose vertices lie behind all of their face planes.
 
-use std::cell::Cell;
 use std::collections::HashMap;
 
 use glam::DVec3;
@@ -82,8 +81,7 @@ impl ConvexMesh {
         let (planes, plane_of_face) = distinct_planes(&surface);
         let tolerance_mm = rounding_tolerance_mm(surface.mesh().vertices.iter());
         let (depth_mm, place) = planes.iter().fold((0.0, DVec3::ZERO), |worst, plane| {
-            let (depth, vertex) = farthest_in_front(&surface, plane, worst.0);
-            if depth > worst.0 { (depth, vertex) } else { worst }
+            surface.farthest_vertex(plane.normal, plane.point, worst.0).unwrap_or(worst)
         });
         if depth_mm > tolerance_mm {
             return Err(Box::new((surface, NotConvex::Reflex { depth_mm, tolerance_mm, place })));
@@ -139,26 +137,6 @@ fn distinct_planes(surface: &ClosedMesh) -> (Vec<Plane>, Vec<Option<u32>>) {
         })
         .collect();
     (planes, of_face)
-}
-
-/// The greatest height of a vertex over the plane, if above `at_least`, and that vertex.
-fn farthest_in_front(surface: &ClosedMesh, plane: &Plane, at_least: f64) -> (f64, DVec3) {
-    let worst = Cell::new((at_least, plane.point));
-    surface.tree().visit(
-        |b| {
-            let support = DVec3::select(plane.normal.cmpge(DVec3::ZERO), b.max, b.min);
-            plane.normal.dot(support - plane.point) > worst.get().0
-        },
-        |face| {
-            for vertex in surface.mesh().triangle(face as usize) {
-                let height = plane.normal.dot(vertex - plane.point);
-                if height > worst.get().0 {
-                    worst.set((height, vertex));
-                }
-            }
-        },
-    );
-    worst.get()
 }
 
 /// How far rounding of its vertices can make a convex surface's vertex stand out of a face's plane, mm.

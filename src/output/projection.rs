@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::png::{self, Labels, Window};
 use super::{FloatImage, Geometry, RgbImage, create_folder, image_of, metaimage, npy};
 use crate::error::Result;
-use crate::modes::project::Projection;
+use crate::modes::project::{Found, Projection};
 use crate::physics::composite::{encode_srgb8, over};
 use crate::scene::{Scene, View};
 
@@ -29,6 +29,8 @@ pub struct Products {
     pub line_integral: bool,
     /// Float image of each organ's own length.
     pub lengths: bool,
+    /// 8-bit PNG of which pixels were traced and which interpolated.
+    pub map: bool,
     /// Each float image also as NPY.
     pub npy: bool,
     /// The radiograph's window; found from the image if `None`.
@@ -84,6 +86,9 @@ pub fn write(
     }
     if products.colour {
         files.push(writer.colour()?);
+    }
+    if products.map {
+        files.push(writer.map()?);
     }
     if products.transmission {
         let t = writer.float_image(projection.transmission())?;
@@ -191,6 +196,22 @@ impl ViewWriter<'_> {
         let file = format!("{}-colour.png", self.stem);
         let bytes = png::write_rgb(&self.path(&file), &image, self.labels())?;
         let quantity = "organs composited front to back, sRGB".into();
+        Ok(WrittenFile { file, quantity, unit: "1", organ: None, window: None, polarity: None, bytes })
+    }
+
+    /// The paper's colour-coded picture: traced pixels white.
+    fn map(&self) -> Result<WrittenFile> {
+        let grey = |found: Found| match found {
+            Found::Nothing => 0,
+            Found::Interpolated => 96,
+            Found::Traced => 255,
+        };
+        let samples = self.projection.found().into_iter().flat_map(|found| [grey(found); 3]).collect();
+        let (columns, rows) = self.projection.size();
+        let image: RgbImage = image_of(columns as usize, rows as usize, samples)?;
+        let file = format!("{}-map.png", self.stem);
+        let bytes = png::write_rgb(&self.path(&file), &image, self.labels())?;
+        let quantity = "white: traced; grey: interpolated; black: no organ asked or met".into();
         Ok(WrittenFile { file, quantity, unit: "1", organ: None, window: None, polarity: None, bytes })
     }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::projection::WrittenFile;
-use crate::modes::project::RayCounts;
+use crate::modes::project::{ForestReport, QueryCounts, RayCounts, SampledError, TreeSettings};
 use crate::physics::{PhotonNoise, Spectrum};
 use crate::scene::organ::{Organ, Origin};
 use crate::scene::{Pose, Scene, View};
@@ -205,6 +205,9 @@ pub struct Summary {
     /// Rays, and what was skipped.
     #[serde(flatten)]
     pub counts: RayCounts,
+    /// What RI-trees did, if they were used.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ritree: Option<TreeSummary>,
     /// Wall-clock seconds per stage.
     pub seconds: BTreeMap<&'static str, f64>,
     /// Threads that worked.
@@ -215,6 +218,19 @@ pub struct Summary {
     pub files: usize,
     /// Bytes written.
     pub bytes_written: u64,
+}
+
+/// What RI-trees did in a run.
+#[derive(Clone, Debug, Serialize)]
+pub struct TreeSummary {
+    /// How they were grown.
+    pub settings: TreeSettings,
+    /// What became of the rays that asked them.
+    pub queries: QueryCounts,
+    /// What they are made of and what building took.
+    pub trees: ForestReport,
+    /// Errors of interpolated lengths on a seeded sample of the run's rays, mm.
+    pub sampled_error: Option<SampledError>,
 }
 
 impl Sidecar {

@@ -85,7 +85,11 @@ impl Place {
     }
 
     /// The corners of the two halves: 8 of each are the cell's own, 8 new ones are sampled and shared.
-    pub fn split<A: Attribute>(&self, attribute: &A, corners: &Corners<A::Output>) -> [Corners<A::Output>; 2] {
+    pub fn split<A: Attribute>(
+        &self,
+        attribute: &A,
+        corners: &Corners<A::Output>,
+    ) -> [Corners<A::Output>; 2] {
         let axis = self.axis();
         let lower = self.half(0).cell;
         let is_high = |bits: usize| bits >> axis & 1 == 1;
@@ -171,8 +175,7 @@ impl Place {
         if spread_exceeds(attribute, usable.iter().map(|&bits| &corners[bits]), angular_threshold_deg) {
             return Err(Reason::Angle);
         }
-        let weights =
-            linear_weights(&usable, self.cell.fractions(&stuv)).ok_or(Reason::Silhouette)?;
+        let weights = linear_weights(&usable, self.cell.fractions(&stuv)).ok_or(Reason::Silhouette)?;
         let parts: Vec<_> = usable.iter().zip(weights).map(|(&bits, w)| (w, &corners[bits])).collect();
         Ok(attribute.interpolate(&parts))
     }

@@ -21,22 +21,24 @@ mod cache;
 mod cell;
 mod node;
 mod stats;
+#[cfg(test)]
+mod tests;
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 pub use attribute::Attribute;
-pub use cache::Cache;
+pub use cache::{Cache, oldest_to_keep};
 pub use cell::Reason;
 pub use stats::{BuildCounts, TreeShape};
 
-use crate::linespace::{LinePoint, is_in_range};
+use crate::linespace::{LinePoint, PlanePair, is_in_range};
 use cell::{Kind, Place, Verdict, quadrilinear};
 use node::{Leaf, Node};
 use stats::BuildCounters;
 
 /// The tree's settings; the defaults are the paper's.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Parameters {
     /// A cell splits if its middle is interpolated worse than this, in the attribute's own distance.
     pub distance_threshold: f64,
@@ -91,16 +93,14 @@ impl<A: Attribute> RiTree<A> {
     ///
     /// Cells on the way that do not exist yet are made and kept while `cache` has room.
     pub fn query(&self, line: LinePoint, cache: &Cache) -> Option<Answer<A::Output>> {
-        let line = if self.attribute.is_symmetric() && line.pair.is_reversed() { line.reversed() } else { line };
+        let line =
+            if self.attribute.is_symmetric() && line.pair.is_reversed() { line.reversed() } else { line };
         if !is_in_range(&line.stuv) {
             return None;
         }
         let mut place = Place::root(line.pair);
-        let root = &self.roots[line.pair.index()];
-        let mut node = match root.get() {
-            Some(node) => node,
-            None if cache.reserve(node::bytes::<A::Output>(1)) => root.get_or_init(Box::default),
-            None => return Some(self.answer_without_keeping(place, None, line.stuv)),
+        let Some(mut node) = self.root(line.pair, cache) else {
+            return Some(self.answer_without_keeping(place, None, line.stuv));
         };
         loop {
             if let Some(leaf) = node.leaf() {
@@ -117,6 +117,22 @@ impl<A: Attribute> RiTree<A> {
             let side = place.side_of(&line.stuv);
             (node, place) = (&halves[side], place.half(side));
         }
+    }
+
+    /// The root of a plane pair's tree, made if need be. `None` if the cache has no room for it.
+    fn root(&self, pair: PlanePair, cache: &Cache) -> Option<&Node<A::Output>> {
+        let root = &self.roots[pair.index()];
+        if root.get().is_none() {
+            let bytes = node::bytes::<A::Output>(1);
+            if !cache.reserve(bytes) {
+                return None;
+            }
+            if root.set(Box::default()).is_err() {
+                // Another thread was first.
+                cache.release(bytes);
+            }
+        }
+        root.get().map(|node| &**node)
     }
 
     /// The same answer, computed on a path that is not kept.
@@ -224,7 +240,7 @@ impl<A: Attribute> RiTree<A> {
     where
         A::Output: PartialEq + std::fmt::Debug,
     {
-        let pairs = crate::linespace::PlanePair::ALL.iter().zip(&self.roots);
+        let pairs = PlanePair::ALL.iter().zip(&self.roots);
         pairs
             .filter_map(|(&pair, root)| root.get().map(|node| (pair, node)))
             .map(|(pair, node)| node::bytes::<A::Output>(1) + node.check(&Place::root(pair), self))

@@ -4,11 +4,11 @@ use std::mem::size_of;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
+use super::RiTree;
 use super::attribute::Attribute;
 use super::cache::Cache;
 use super::cell::{Corners, Kind, Place, Verdict};
 use super::stats::TreeShape;
-use super::RiTree;
 
 /// A cell of the tree. A node that holds neither leaf nor halves nor corners was pruned, or never looked at.
 pub struct Node<T> {
@@ -73,7 +73,12 @@ impl<T: Clone + Send + Sync> Node<T> {
 
     /// Gives the node its leaf or its halves, as its cell says. If the cache has no room, the node stays as it is and its
     /// corners are the error (or `None` if it has none).
-    pub fn expand<A>(&self, place: &Place, tree: &RiTree<A>, cache: &Cache) -> Result<(), Option<Box<Corners<T>>>>
+    pub fn expand<A>(
+        &self,
+        place: &Place,
+        tree: &RiTree<A>,
+        cache: &Cache,
+    ) -> Result<(), Option<Box<Corners<T>>>>
     where
         A: Attribute<Output = T>,
     {
@@ -95,10 +100,9 @@ impl<T: Clone + Send + Sync> Node<T> {
                 size_of::<Leaf<T>>()
             }
             Verdict::Split => {
-                let halves = tree.split(place, &corners).map(|corners| Self {
-                    corners: Mutex::new(Some(Box::new(corners))),
-                    ..Self::default()
-                });
+                let halves = tree
+                    .split(place, &corners)
+                    .map(|corners| Self { corners: Mutex::new(Some(Box::new(corners))), ..Self::default() });
                 let _ = self.halves.set(Box::new(halves));
                 bytes::<T>(2) + 2 * size_of::<Corners<T>>()
             }
@@ -157,7 +161,10 @@ impl<T: Clone + Send + Sync> Node<T> {
         let sampled = place.sample(&tree.attribute);
         let verdict = || tree.verdict(place, &sampled);
         if let Some(leaf) = self.leaf() {
-            assert!(self.halves().is_none() && self.lock().is_none(), "a final leaf holds only its own corners");
+            assert!(
+                self.halves().is_none() && self.lock().is_none(),
+                "a final leaf holds only its own corners"
+            );
             assert_eq!(leaf.corners, sampled, "stored corners are their lines' samples");
             assert_eq!(Verdict::Final(leaf.kind), verdict(), "a final leaf is final");
             return size_of::<Leaf<T>>();

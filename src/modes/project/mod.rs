@@ -10,6 +10,8 @@
 //! is wanted. A pixel's values depend on its ray and its tile alone (on the tile by a rounding, see
 //! `exact::clip::NarrowedClipper`), so images are the same bits for any number of threads.
 
+mod forest;
+mod spot_check;
 mod sweep;
 mod tile;
 
@@ -22,6 +24,10 @@ use super::Control;
 use crate::error::Result;
 use crate::physics::{Attenuator, PhotonNoise};
 use crate::scene::{Scene, View};
+pub use forest::{ForestReport, QueryCounts, TreeSettings};
+pub use spot_check::SampledError;
+
+use forest::Forest;
 use tile::TileTracer;
 
 /// Side of a tile, pixels: its rays' lengths for a few organs fit the second-level cache, and 1024² pixels make 1024 tiles.
@@ -38,6 +44,15 @@ pub struct Wanted {
     pub colour: bool,
 }
 
+/// How lengths are found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Method {
+    /// Every chord exactly.
+    Exact,
+    /// By one RI-tree per convex organ, whose samples are exact chords; what it does not interpolate is exact.
+    RiTree(TreeSettings),
+}
+
 /// A scene made ready to be projected: the organs before one spectrum, and what is wanted of them.
 pub struct Projector<'a> {
     scene: &'a Scene,
@@ -46,6 +61,7 @@ pub struct Projector<'a> {
     wanted: Wanted,
     /// Organs whose chords are needed, by index.
     traced: Vec<usize>,
+    forest: Option<Forest<'a>>,
 }
 
 impl<'a> Projector<'a> {
@@ -53,7 +69,7 @@ impl<'a> Projector<'a> {
     ///
     /// # Errors
     /// An energy that a material's table does not reach.
-    pub fn new(scene: &'a Scene, wanted: Wanted, noise: Option<PhotonNoise>) -> Result<Self> {
+    pub fn new(scene: &'a Scene, wanted: Wanted, noise: Option<PhotonNoise>, method: Method) -> Result<Self> {
         let organs: Vec<_> = scene.organs.iter().map(|o| (o.material, o.density_g_cm3)).collect();
         let attenuator = Attenuator::new(&organs, &scene.spectrum, scene.response)?;
         let needs_own: Vec<bool> = scene
@@ -70,7 +86,25 @@ impl<'a> Projector<'a> {
         let traced = (0..scene.organs.len())
             .filter(|&i| needs_own[i] || scene.organs[i].parent.is_some_and(|p| needs_own[p]))
             .collect();
-        Ok(Self { scene, attenuator, noise, wanted, traced })
+        let bodies = || scene.organs.iter().map(|organ| &organ.body).collect();
+        let forest = match method {
+            Method::Exact => None,
+            Method::RiTree(settings) => Some(Forest::new(bodies(), settings)),
+        };
+        Ok(Self { scene, attenuator, noise, wanted, traced, forest })
+    }
+
+    /// The trees' state. `None` without trees.
+    pub fn forest(&self) -> Option<ForestReport> {
+        self.forest.as_ref().map(Forest::report)
+    }
+
+    /// Checks every tree from its root to its leaves. For tests: it samples every corner anew.
+    ///
+    /// # Panics
+    /// If something stored is not what its cell says, or the bytes do not add up.
+    pub fn check_invariants(&self) {
+        self.forest.iter().for_each(Forest::check_invariants);
     }
 
     /// The attenuation in use.
@@ -101,9 +135,12 @@ impl<'a> Projector<'a> {
                 Ok(tile)
             })
             .collect::<Result<_>>()?;
-        let mut counts = RayCounts::default();
-        tiles.iter().for_each(|tile| counts += tile.counts);
-        Ok(Projection { columns, rows, tiles, counts })
+        let (mut counts, mut queries) = (RayCounts::default(), QueryCounts::default());
+        for tile in &tiles {
+            counts += tile.counts;
+            queries += tile.queries;
+        }
+        Ok(Projection { columns, rows, tiles, counts, queries })
     }
 }
 
@@ -118,6 +155,8 @@ pub struct RayCounts {
     pub organ_rays: u64,
     /// Organ-rays traced exactly.
     pub organ_rays_exact: u64,
+    /// Organ-rays answered by an RI-tree.
+    pub organ_rays_interpolated: u64,
     /// Organ-rays skipped because the organ's box misses the tile.
     pub organ_rays_skipped_by_bounds: u64,
     /// Organ-rays skipped because no output asks for the organ.
@@ -130,6 +169,7 @@ impl AddAssign for RayCounts {
         self.rays_skipped_by_bounds += other.rays_skipped_by_bounds;
         self.organ_rays += other.organ_rays;
         self.organ_rays_exact += other.organ_rays_exact;
+        self.organ_rays_interpolated += other.organ_rays_interpolated;
         self.organ_rays_skipped_by_bounds += other.organ_rays_skipped_by_bounds;
         self.organ_rays_skipped_unneeded += other.organ_rays_skipped_unneeded;
     }
@@ -155,7 +195,22 @@ struct Tile {
     line_integral: Vec<f32>,
     transmission: Vec<f32>,
     colour: Vec<[f32; 4]>,
+    /// How each pixel was found, the organ that took most telling.
+    found: Vec<Found>,
     counts: RayCounts,
+    queries: QueryCounts,
+}
+
+/// How a pixel's lengths were found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Found {
+    /// No organ is met, or none was asked.
+    #[default]
+    Nothing,
+    /// All by interpolation.
+    Interpolated,
+    /// At least one organ's by tracing.
+    Traced,
 }
 
 /// The images of one view. Kept by tile, so that organs cost memory only where they are seen.
@@ -164,9 +219,20 @@ pub struct Projection {
     rows: u32,
     tiles: Vec<Tile>,
     counts: RayCounts,
+    queries: QueryCounts,
 }
 
 impl Projection {
+    /// What became of the rays that asked RI-trees.
+    pub fn queries(&self) -> QueryCounts {
+        self.queries
+    }
+
+    /// How each pixel was found, row by row.
+    pub fn found(&self) -> Vec<Found> {
+        self.assemble(Found::Nothing, |tile| Some(&tile.found))
+    }
+
     /// Columns and rows.
     pub fn size(&self) -> (u32, u32) {
         (self.columns, self.rows)

@@ -1,15 +1,18 @@
 //! One tile of a projection, from rays to values.
 
+use super::forest::{Forest, Grove, QueryCounts, holds_box};
 use super::sweep::own_stretches;
-use super::{Projector, RayCounts, Region, Tile};
+use super::{Found, Projector, RayCounts, Region, Tile};
+use crate::attributes::chord::ChordLength;
 use crate::geometry::{Interval, Segment};
 use crate::physics::composite::composite;
 use crate::physics::{Appearance, RowMass};
+use crate::ritree::RiTree;
 use crate::scene::{Frustum, View};
 
 /// Traces tiles of one view.
-pub struct TileTracer<'a> {
-    projector: &'a Projector<'a>,
+pub struct TileTracer<'a, 's> {
+    projector: &'a Projector<'s>,
     view: &'a View,
     view_index: u64,
     appearances: Vec<Appearance>,
@@ -24,8 +27,31 @@ struct OrganChords {
     own: Vec<f64>,
 }
 
-impl<'a> TileTracer<'a> {
-    pub fn new(projector: &'a Projector<'a>, view: &'a View, view_index: u64) -> Self {
+/// What is noted on the way about how rays were answered.
+struct TileWork {
+    found: Vec<Found>,
+    queries: QueryCounts,
+}
+
+impl TileWork {
+    /// The tree's answer. `None` if the ray is to be traced.
+    fn ask(&mut self, grove: &Grove, tree: &RiTree<ChordLength>, ray: &Segment) -> Option<Option<Interval>> {
+        self.queries.queries += 1;
+        match grove.chord(tree, ray) {
+            Ok(chord) => {
+                self.queries.interpolated += 1;
+                Some(chord)
+            }
+            Err(reason) => {
+                self.queries.trace(reason);
+                None
+            }
+        }
+    }
+}
+
+impl<'a, 's> TileTracer<'a, 's> {
+    pub fn new(projector: &'a Projector<'s>, view: &'a View, view_index: u64) -> Self {
         let appearances = projector.scene.organs.iter().map(|o| o.appearance).collect();
         Self { projector, view, view_index, appearances }
     }
@@ -33,7 +59,6 @@ impl<'a> TileTracer<'a> {
     pub fn trace(&self, region: Region) -> Tile {
         let frustum = self.view.frustum(region.columns.clone(), region.rows.clone());
         let touched = self.touched(&frustum);
-        let counts = self.count(&region, touched.len());
         let rays: Vec<Segment> = region
             .rows
             .clone()
@@ -44,15 +69,26 @@ impl<'a> TileTracer<'a> {
         let wanted = self.projector.wanted;
         let mut per_ray: Vec<Vec<(usize, Interval)>> =
             vec![Vec::new(); if wanted.colour { rays.len() } else { 0 }];
-        let mut organs: Vec<OrganChords> =
-            touched.iter().map(|&organ| self.chords(organ, &frustum, &rays, &mut per_ray)).collect();
+        let mut work = TileWork { found: Vec::new(), queries: QueryCounts::default() };
+        let grove = self.projector.forest.as_ref().map(Forest::enter);
+        if grove.is_some() && !touched.is_empty() {
+            work.found = vec![Found::Nothing; rays.len()];
+        }
+        let mut organs: Vec<OrganChords> = touched
+            .iter()
+            .map(|&organ| self.chords(organ, &frustum, &rays, grove.as_ref(), &mut per_ray, &mut work))
+            .collect();
+        drop(grove);
+        self.projector.forest.iter().for_each(Forest::prune_if_full);
         self.take_children_off(&mut organs);
+        let counts = self.count(&region, touched.len(), work.queries.interpolated);
 
         let (line_integral, transmission) =
             if wanted.attenuation { self.attenuate(&region, &organs) } else { Default::default() };
         let colour = if wanted.colour && !organs.is_empty() { self.colour(&per_ray) } else { Vec::new() };
         let lengths = if wanted.lengths { seen(&organs) } else { Vec::new() };
-        Tile { region, lengths, line_integral, transmission, colour, counts }
+        let TileWork { found, queries } = work;
+        Tile { region, lengths, line_integral, transmission, colour, found, counts, queries }
     }
 
     /// The organs to trace whose boxes the tile's rays may touch.
@@ -61,14 +97,15 @@ impl<'a> TileTracer<'a> {
         self.projector.traced.iter().copied().filter(|&organ| !frustum.misses(&bounds(organ))).collect()
     }
 
-    fn count(&self, region: &Region, touched: usize) -> RayCounts {
+    fn count(&self, region: &Region, touched: usize, interpolated: u64) -> RayCounts {
         let rays = region.pixels() as u64;
         let (all, traced) = (self.projector.scene.organs.len() as u64, self.projector.traced.len() as u64);
         RayCounts {
             rays,
             rays_skipped_by_bounds: if touched == 0 { rays } else { 0 },
             organ_rays: rays * all,
-            organ_rays_exact: rays * touched as u64,
+            organ_rays_exact: rays * touched as u64 - interpolated,
+            organ_rays_interpolated: interpolated,
             organ_rays_skipped_by_bounds: rays * (traced - touched as u64),
             organ_rays_skipped_unneeded: rays * (all - traced),
         }
@@ -79,22 +116,50 @@ impl<'a> TileTracer<'a> {
         organ: usize,
         frustum: &Frustum,
         rays: &[Segment],
+        grove: Option<&Grove>,
         per_ray: &mut [Vec<(usize, Interval)>],
+        work: &mut TileWork,
     ) -> OrganChords {
         let body = &self.projector.scene.organs[organ].body;
+        let tree = grove.and_then(|grove| grove.tree(organ).map(|tree| (grove, tree)));
+        let bounds = body.bounds();
         let mut body = body.narrowed(|bounds| !frustum.misses(bounds));
         let mut parts = Vec::new();
-        let lengths: Vec<f64> = rays
-            .iter()
-            .enumerate()
-            .map(|(i, ray)| {
-                body.chords_of_segment(ray, &mut parts);
-                if let Some(all) = per_ray.get_mut(i) {
-                    all.extend(parts.iter().map(|part| (organ, *part)));
+        let mut lengths = Vec::with_capacity(rays.len());
+        for (i, ray) in rays.iter().enumerate() {
+            let asked = match tree {
+                None => {
+                    work.queries.traced_without_tree += u64::from(grove.is_some());
+                    None
                 }
-                parts.iter().map(Interval::length).sum::<f64>()
-            })
-            .collect();
+                Some(_) if !holds_box(ray, &bounds) => {
+                    work.queries.traced_source_or_target_inside += 1;
+                    None
+                }
+                Some((grove, tree)) => work.ask(grove, tree, ray),
+            };
+            let found = match asked {
+                Some(chord) => {
+                    parts.clear();
+                    parts.extend(chord);
+                    Found::Interpolated
+                }
+                None => {
+                    body.chords_of_segment(ray, &mut parts);
+                    Found::Traced
+                }
+            };
+            // A ray that a cell proves to miss says nothing on the map; one that was traced to find so does.
+            if let Some(pixel) = work.found.get_mut(i).filter(|_| tree.is_some())
+                && (found == Found::Traced || !parts.is_empty())
+            {
+                *pixel = found.max(*pixel);
+            }
+            if let Some(all) = per_ray.get_mut(i) {
+                all.extend(parts.iter().map(|part| (organ, *part)));
+            }
+            lengths.push(parts.iter().map(Interval::length).sum::<f64>());
+        }
         OrganChords { organ, own: lengths.clone(), lengths }
     }
 

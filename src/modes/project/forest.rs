@@ -1,0 +1,201 @@
+//! The RI-trees of a run: one per organ, made when the first ray reaches it, under one cache.
+
+use std::sync::{OnceLock, PoisonError, RwLock, RwLockReadGuard};
+
+use serde::Serialize;
+
+use crate::attributes::chord::ChordLength;
+use crate::exact::Body;
+use crate::geometry::{Interval, Segment};
+use crate::ritree::{Answer, BuildCounts, Cache, Parameters, Reason, RiTree, TreeShape, oldest_to_keep};
+
+/// How RI-trees are grown; the defaults are the paper's.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct TreeSettings {
+    /// The thresholds and the depth.
+    pub parameters: Parameters,
+    /// The most that nodes and samples of all trees may hold, bytes.
+    pub cache_bytes: usize,
+    /// The share of the cache that pruning keeps.
+    pub kept_share: f64,
+    /// Bodies with fewer face planes than this are clipped: that is cheaper than a query.
+    pub least_planes: usize,
+}
+
+impl Default for TreeSettings {
+    fn default() -> Self {
+        Self {
+            parameters: Parameters::default(),
+            cache_bytes: 100_000_000,
+            kept_share: 0.3,
+            least_planes: 48,
+        }
+    }
+}
+
+/// What became of the rays that asked trees.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct QueryCounts {
+    /// Queries of trees.
+    pub queries: u64,
+    /// Answered by interpolation, or by the proof that the cell is empty.
+    pub interpolated: u64,
+    /// Traced: the cell lies across the body's outline.
+    pub traced_silhouette: u64,
+    /// Traced: more than two classes.
+    pub traced_classes: u64,
+    /// Traced: directions too far apart.
+    pub traced_angle: u64,
+    /// Traced: all corners miss, but the cell is not proved empty.
+    pub traced_guard: u64,
+    /// Not asked: the source or the target lies within the organ's box, so the whole line's chord does not serve.
+    pub traced_source_or_target_inside: u64,
+    /// Not asked: the body is not convex, or has so few faces that clipping is cheaper.
+    pub traced_without_tree: u64,
+}
+
+impl std::ops::AddAssign for QueryCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.queries += other.queries;
+        self.interpolated += other.interpolated;
+        self.traced_silhouette += other.traced_silhouette;
+        self.traced_classes += other.traced_classes;
+        self.traced_angle += other.traced_angle;
+        self.traced_guard += other.traced_guard;
+        self.traced_source_or_target_inside += other.traced_source_or_target_inside;
+        self.traced_without_tree += other.traced_without_tree;
+    }
+}
+
+impl QueryCounts {
+    pub(super) fn trace(&mut self, reason: Reason) {
+        match reason {
+            Reason::Silhouette => self.traced_silhouette += 1,
+            Reason::Classes => self.traced_classes += 1,
+            Reason::Angle => self.traced_angle += 1,
+            Reason::Guard => self.traced_guard += 1,
+        }
+    }
+}
+
+/// The trees' state after a run.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct ForestReport {
+    /// Trees made; organs no ray reaches have none.
+    pub trees: usize,
+    /// What building took.
+    #[serde(flatten)]
+    pub build: BuildCounts,
+    /// What the trees are made of.
+    #[serde(flatten)]
+    pub shape: TreeShape,
+    /// Bytes of nodes and samples.
+    pub tree_bytes: usize,
+    /// The most they may be.
+    pub cache_bytes: usize,
+}
+
+/// One tree per organ, under one cache.
+pub struct Forest<'a> {
+    trees: RwLock<Vec<OnceLock<RiTree<ChordLength<'a>>>>>,
+    bodies: Vec<&'a Body>,
+    settings: TreeSettings,
+    cache: Cache,
+}
+
+/// Many trees to ask, none of them pruned meanwhile.
+pub struct Grove<'f, 'a> {
+    trees: RwLockReadGuard<'f, Vec<OnceLock<RiTree<ChordLength<'a>>>>>,
+    forest: &'f Forest<'a>,
+}
+
+impl<'a> Forest<'a> {
+    pub fn new(bodies: Vec<&'a Body>, settings: TreeSettings) -> Self {
+        let trees = RwLock::new(bodies.iter().map(|_| OnceLock::new()).collect());
+        Self { trees, bodies, settings, cache: Cache::new(settings.cache_bytes) }
+    }
+
+    /// The trees, to be asked by one thread for the rays of one tile: the only lock, and not per ray.
+    pub fn enter(&self) -> Grove<'_, 'a> {
+        Grove { trees: self.trees.read().unwrap_or_else(PoisonError::into_inner), forest: self }
+    }
+
+    /// Forgets the least recently used leaves if the cache was full.
+    pub fn prune_if_full(&self) {
+        if !self.cache.is_full() {
+            return;
+        }
+        let mut trees = self.trees.write().unwrap_or_else(PoisonError::into_inner);
+        if !self.cache.is_full() {
+            // Another thread was first.
+            return;
+        }
+        let mut stamps = Vec::new();
+        trees.iter().filter_map(OnceLock::get).for_each(|tree| tree.collect_stamps(&mut stamps));
+        let kept_bytes = (self.settings.kept_share * self.cache.limit_bytes() as f64) as usize;
+        let oldest = oldest_to_keep(stamps, kept_bytes);
+        trees.iter_mut().filter_map(OnceLock::get_mut).for_each(|tree| tree.prune(oldest, &self.cache));
+        self.cache.relieved();
+    }
+
+    pub fn report(&self) -> ForestReport {
+        let grove = self.enter();
+        let mut report = ForestReport {
+            tree_bytes: self.cache.used_bytes(),
+            cache_bytes: self.cache.limit_bytes(),
+            ..ForestReport::default()
+        };
+        for tree in grove.trees.iter().filter_map(OnceLock::get) {
+            report.trees += 1;
+            report.build += tree.build_counts();
+            report.shape.add(&tree.shape());
+        }
+        report
+    }
+
+    /// Checks every tree from its root to its leaves, and that their bytes are the cache's. For tests.
+    ///
+    /// # Panics
+    /// If something stored is not what its cell says.
+    pub fn check_invariants(&self) {
+        let bytes: usize =
+            self.enter().trees.iter().filter_map(OnceLock::get).map(RiTree::check_invariants).sum();
+        assert_eq!(bytes, self.cache.used_bytes(), "the cache counts what the trees hold");
+        assert!(bytes <= self.cache.limit_bytes(), "the cache keeps its promise");
+    }
+}
+
+impl<'a> Grove<'_, 'a> {
+    /// The tree of an organ. `None` if its body is not put in a tree.
+    pub fn tree(&self, organ: usize) -> Option<&RiTree<ChordLength<'a>>> {
+        let body = self.forest.bodies[organ];
+        let convex = body.convexity().ok()?;
+        if convex.planes().len() < self.forest.settings.least_planes {
+            return None;
+        }
+        let attribute = ChordLength::new(body)?;
+        let tree = self.trees[organ].get_or_init(|| RiTree::new(attribute, self.forest.settings.parameters));
+        tree.tick();
+        Some(tree)
+    }
+
+    /// The chord of a segment that holds the body's box whole, as the tree of that body knows it. `Err` says why it is
+    /// to be traced; `Ok(None)` that it misses.
+    pub fn chord(&self, tree: &RiTree<ChordLength>, segment: &Segment) -> Result<Option<Interval>, Reason> {
+        let line = segment.line();
+        let attribute = tree.attribute();
+        let point = attribute.space().point_of(line);
+        match tree.query(point, &self.forest.cache) {
+            None | Some(Answer::Interpolated(None)) => Ok(None),
+            Some(Answer::Interpolated(Some(chord))) => Ok(attribute.stretch(chord, line, point)),
+            Some(Answer::Trace(reason)) => Err(reason),
+        }
+    }
+}
+
+/// Whether the whole box lies between the segment's ends, so that its line's chord is its own.
+pub fn holds_box(segment: &Segment, bounds: &crate::geometry::Bounds) -> bool {
+    let (o, d) = (segment.line().origin(), segment.line().dir());
+    let (middle, half) = ((bounds.centre() - o).dot(d), 0.5 * bounds.size().dot(d.abs()));
+    middle - half >= 0.0 && middle + half <= segment.length_mm()
+}
