@@ -70,12 +70,14 @@ impl Attribute for ChordLength<'_> {
     fn sample(&self, point: LinePoint) -> Option<Chord> {
         let mut parts = Vec::new();
         let line = self.space.line_of(point)?;
-        self.body.chords(&line, &mut parts);
-        let chord = parts.first()?;
+        self.body.chords_of_lone_line(&line, &mut parts);
+        // A line along a face may leave and enter again within rounding; a convex body has one chord.
+        let (first, last) = (parts.first()?, parts.last()?);
+        let (start, end) = (first.start(), last.end());
         let [k, ..] = point.pair.axes();
-        let first = if line.dir()[k] > 0.0 { chord.start() } else { chord.end() };
-        let entry = (line.at(first)[k] - self.space.min()[k]) / self.space.size()[k];
-        Some(Chord { length_mm: chord.length() as f32, entry: entry as f32 })
+        let lowest = if line.dir()[k] > 0.0 { start } else { end };
+        let entry = (line.at(lowest)[k] - self.space.min()[k]) / self.space.size()[k];
+        Some(Chord { length_mm: (end - start) as f32, entry: entry as f32 })
     }
 
     fn class(&self, output: &Self::Output) -> u32 {
@@ -128,5 +130,151 @@ impl Attribute for ChordLength<'_> {
             let highest = self.body.surface().farthest_vertex(n, min, f64::NEG_INFINITY);
             highest.is_some_and(|(height, _)| height - at_0 < -LEAST_SEPARATION)
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+    use crate::geometry::primitives::{cube, icosphere};
+    use crate::geometry::{ClosedMesh, TriMesh, UnitDir};
+    use crate::ritree::{Answer, Cache, Parameters, Reason, RiTree};
+
+    fn body(mesh: TriMesh) -> Body {
+        Body::new(ClosedMesh::new(mesh).expect("closed").0)
+    }
+
+    fn ellipsoid() -> Body {
+        body(icosphere(3).map_vertices(|v| v * DVec3::new(100.0, 80.0, 60.0) + DVec3::new(7.0, -300.0, 1e3)))
+    }
+
+    fn lines_near(body: &Body, seed: u64, count: usize) -> impl Iterator<Item = Line> {
+        let bounds = body.bounds();
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(seed);
+        let mut point = move || bounds.min + bounds.size() * DVec3::from([0; 3].map(|_| rng.random::<f64>()));
+        (0..count).filter_map(move |_| {
+            let (a, b) = (point(), point());
+            Line::new(a, UnitDir::new(b - a)?)
+        })
+    }
+
+    fn exact(body: &Body, line: &Line) -> Option<Interval> {
+        let mut parts = Vec::new();
+        body.chords(line, &mut parts);
+        parts.first().copied()
+    }
+
+    #[test]
+    fn interpolated_chords_are_near_the_exact_ones_and_begin_where_they_do() {
+        let body = ellipsoid();
+        let chords = ChordLength::new(&body).expect("convex");
+        let parameters = Parameters { distance_threshold: 0.01, ..Parameters::default() };
+        let (tree, cache) = (RiTree::new(chords, parameters), Cache::new(1 << 30));
+        let (mut compared, mut sum) = (0, 0.0);
+        for line in lines_near(&body, 1, 2_000) {
+            let point = tree.attribute().space().point_of(&line);
+            let answer = tree.query(point, &cache).expect("in range");
+            match (answer, exact(&body, &line)) {
+                (Answer::Interpolated(Some(chord)), Some(exact)) => {
+                    let near = tree.attribute().stretch(chord, &line, point).expect("a stretch");
+                    // The test at a cell's centre bounds no other line; 15 thresholds were never seen exceeded.
+                    assert!((near.length() - exact.length()).abs() < 15.0, "{near:?}, not {exact:?}");
+                    assert!((near.start() - exact.start()).abs() < 15.0, "{near:?}, not {exact:?}");
+                    sum += (near.length() - exact.length()).abs();
+                    compared += 1;
+                }
+                (Answer::Interpolated(None), None) | (Answer::Trace(_), _) => {}
+                (answer, exact) => panic!("{answer:?} for {exact:?}"),
+            }
+        }
+        assert!(
+            compared > 500 && sum / f64::from(compared) < 1.0,
+            "{compared} compared, mean {}",
+            sum / f64::from(compared)
+        );
+        tree.check_invariants();
+    }
+
+    #[test]
+    fn a_body_is_never_lost_however_thin_or_small_its_cells() {
+        // A plate 1/10 000 of its width thick, oblique to all axes: lines through it, most cells of which have no
+        // corner that meets it.
+        let tilt = glam::DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.7);
+        let plate = body(cube(1.0).map_vertices(|v| tilt * (v * DVec3::new(100.0, 100.0, 0.01))));
+        let needle = body(cube(1.0).map_vertices(|v| tilt * (v * DVec3::new(100.0, 0.01, 0.01))));
+        for body in [plate, needle] {
+            for max_depth in [0, 8, 20] {
+                let chords = ChordLength::new(&body).expect("convex");
+                let parameters = Parameters { max_depth, ..Parameters::default() };
+                let (tree, cache) = (RiTree::new(chords, parameters), Cache::new(1 << 30));
+                let mut rng = rand_pcg::Pcg64::seed_from_u64(2);
+                for _ in 0..300 {
+                    let inside = tilt
+                        * (DVec3::from([0; 3].map(|_| rng.random_range(-0.49..0.49))) * body_size(&body));
+                    let dir = UnitDir::new(DVec3::from([0; 3].map(|_| rng.random_range(-1.0..1.0))))
+                        .expect("a direction");
+                    let line = Line::new(inside, dir).expect("finite");
+                    if exact(&body, &line).is_none() {
+                        continue;
+                    }
+                    let answer = tree.query(tree.attribute().space().point_of(&line), &cache);
+                    assert_ne!(answer, Some(Answer::Interpolated(None)), "lost at depth {max_depth}");
+                    assert_ne!(answer, None, "lost out of range");
+                }
+            }
+        }
+    }
+
+    /// Points of either test body lie within this box before the tilt.
+    fn body_size(body: &Body) -> DVec3 {
+        let is_needle = body.surface().volume_mm3() < 1.0;
+        DVec3::new(100.0, if is_needle { 0.01 } else { 100.0 }, 0.01)
+    }
+
+    #[test]
+    fn empty_cells_are_proved_and_cells_with_the_body_are_not() {
+        let body = ellipsoid();
+        let chords = ChordLength::new(&body).expect("convex");
+        let pair = PlanePair::ALL[3];
+        let around = |c: [f64; 4], r: f64| Cell { low: c.map(|x| x - r), high: c.map(|x| x + r) };
+        assert!(chords.is_certainly_empty(pair, &around([-0.5, 0.5, -0.5, 0.5], 0.2)));
+        assert!(
+            chords.is_certainly_empty(pair, &around([1.1, 1.1, 1.1, 1.1], 0.02)),
+            "past a corner, obliquely"
+        );
+        assert!(!chords.is_certainly_empty(pair, &around([0.5; 4], 0.01)));
+        for line in lines_near(&body, 3, 3_000) {
+            let point = chords.space().point_of(&line);
+            if exact(&body, &line).is_some() {
+                let cell = around(point.stuv, 1e-6);
+                assert!(!chords.is_certainly_empty(point.pair, &cell), "{point:?} meets the body");
+            }
+        }
+    }
+
+    #[test]
+    fn both_directions_of_a_line_share_one_tree_and_one_chord() {
+        let body = ellipsoid();
+        let chords = ChordLength::new(&body).expect("convex");
+        let (tree, cache) = (RiTree::new(chords, Parameters::default()), Cache::new(1 << 30));
+        for line in lines_near(&body, 4, 300) {
+            let ask = |line: &Line| {
+                let point = tree.attribute().space().point_of(line);
+                tree.query(point, &cache).map(|answer| match answer {
+                    Answer::Interpolated(chord) => {
+                        chord.and_then(|c| tree.attribute().stretch(c, line, point))
+                    }
+                    Answer::Trace(Reason::Silhouette | Reason::Guard) => None,
+                    Answer::Trace(reason) => panic!("{reason:?}"),
+                })
+            };
+            if let (Some(Some(there)), Some(Some(back))) = (ask(&line), ask(&line.reversed())) {
+                assert!((there.length() - back.length()).abs() < 1e-3);
+                assert!((there.start() + back.end()).abs() < 1e-3, "{there:?} {back:?}");
+            }
+        }
+        assert!(tree.build_counts().samples_taken > 0);
     }
 }

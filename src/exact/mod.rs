@@ -13,6 +13,9 @@ use glam::DVec3;
 use crate::geometry::{Bounds, ClosedMesh, ConvexMesh, Interval, Line, NotConvex, Segment};
 use clip::{ConvexClipper, NarrowedClipper};
 
+/// Planes that are clipped in the time of one descent of a box hierarchy.
+const CLIP_PLANES: usize = 200;
+
 /// A closed body, ready for exact chords.
 #[derive(Clone, Debug)]
 pub struct Body {
@@ -80,6 +83,17 @@ impl Body {
                 parts.extend(clipper.chord(line));
             }
             Form::General { surface, .. } => bvh::chords(surface, line, parts),
+        }
+    }
+
+    /// As [`chords`](Self::chords), by whichever engine is the faster for one line on its own: beyond some hundred planes
+    /// the box hierarchy, also of convex bodies. Both are exact; they may differ in the last bits.
+    pub fn chords_of_lone_line(&self, line: &Line, parts: &mut Vec<Interval>) {
+        match &self.form {
+            Form::Convex { mesh, .. } if mesh.planes().len() > CLIP_PLANES => {
+                bvh::chords(mesh.surface(), line, parts);
+            }
+            _ => self.chords(line, parts),
         }
     }
 

@@ -46,7 +46,8 @@ impl Projector<'_> {
                     continue;
                 };
                 let Ok(chord) = grove.chord(tree, &ray) else { continue };
-                body.chords_of_segment(&ray, &mut parts);
+                // The whole box lies between the ray's ends, so its line's chord is its own.
+                body.chords_of_lone_line(ray.line(), &mut parts);
                 let exact: f64 = parts.iter().map(Interval::length).sum();
                 let near = chord.map_or(0.0, |c| c.length());
                 if exact > 0.0 || near > 0.0 {
