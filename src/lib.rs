@@ -5,9 +5,12 @@
 //! attenuated projections for any spectrum.
 //!
 //! ```text
-//! scene.toml ─► scene ─► geometry ─► exact ─► modes ─► output
-//!               (units,  (closed?    (clip,   (project) (images,
-//!                frames)  convex?)    bvh)               records)
+//! scene.toml ─► scene ─► geometry ─► exact ──┐ samples
+//!               (units,  (closed?    (clip,  ▼
+//!                frames)  convex?)    bvh)   ritree<Attribute> ◄── linespace (s, t, u, v)
+//!                                       │    │ queries
+//!                                       ▼    ▼
+//!                                  modes: project ─► output (images, records)
 //! ```
 //!
 //! Each room imports from its left only. Lengths are mm, angles degrees, energies keV, densities g/cm³, attenuation

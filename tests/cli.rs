@@ -123,6 +123,7 @@ fn json_goes_to_standard_output_and_nothing_else_does() {
     assert_eq!(
         count("organ_rays"),
         count("organ_rays_exact")
+            + count("organ_rays_interpolated")
             + count("organ_rays_skipped_by_bounds")
             + count("organ_rays_skipped_unneeded")
     );
@@ -299,4 +300,78 @@ fn interrupting_a_run_that_still_loads_its_scene_stops_it_at_once() {
         assert!(kill.expect("kill runs").success());
         assert_eq!(child.wait().expect("an end").code(), Some(130), "{command}");
     }
+}
+
+#[test]
+fn ritrees_report_what_they_did_and_draw_their_map() {
+    let folder = folder();
+    let args = [
+        "project",
+        "balls.toml",
+        "--method",
+        "ritree",
+        "--max-depth",
+        "16",
+        "--map",
+        "--json",
+        "--write",
+        "p",
+    ];
+    let run = chordfield(folder.path(), &args);
+    let summary: serde_json::Value = serde_json::from_slice(&run.stdout).expect("only JSON");
+    assert_eq!(summary["method"], "ritree");
+    let trees = &summary["ritree"];
+    assert_eq!(trees["settings"]["parameters"]["max_depth"], 16);
+    for (group, key) in [
+        ("queries", "queries"),
+        ("queries", "interpolated"),
+        ("trees", "samples_taken"),
+        ("trees", "tree_bytes"),
+        ("sampled_error", "compared"),
+    ] {
+        assert!(trees[group][key].as_u64().is_some_and(|n| n > 0), "{group}.{key}: {trees}");
+    }
+    let map = image::open(folder.path().join("out/balls-g000-map.png")).expect("a map").to_rgb8();
+    let count = |grey: u8| map.pixels().filter(|p| p.0 == [grey; 3]).count();
+    assert!(count(255) > 0 && count(96) > 0 && count(0) > 0, "traced, interpolated and empty pixels");
+    for bad in [["--distance-threshold", "nan"], ["--prune-keep", "2"], ["--cache-mb", "-1"]] {
+        let run = chordfield(folder.path(), &["project", "balls.toml", "--method", "ritree", bad[0], bad[1]]);
+        assert_eq!(run.status.code(), Some(2), "{bad:?}");
+    }
+}
+
+/// What a projection may hold beside cache, images and meshes: the program itself, spectra and tables, the stacks and
+/// scratch of its threads.
+#[cfg(target_os = "linux")]
+const MEMORY_SLACK: f64 = 40e6;
+
+#[cfg(target_os = "linux")]
+#[test]
+fn peak_memory_stays_under_cache_plus_images_plus_meshes_plus_slack() {
+    let folder = folder();
+    let args = [
+        "project",
+        "balls.toml",
+        "--method",
+        "ritree",
+        "--cache-mb",
+        "4",
+        "--size",
+        "512x512",
+        "--gantry",
+        "0..360:60",
+        "--json",
+        "--threads",
+        "2",
+        "--write",
+        "p",
+    ];
+    let run = chordfield(folder.path(), &args);
+    assert_eq!(run.status.code(), Some(0), "{}", err(&run));
+    let summary: serde_json::Value = serde_json::from_slice(&run.stdout).expect("only JSON");
+    let peak = summary["peak_bytes"].as_f64().expect("Linux tells");
+    // p and T of a view by tiles and once more as an image; a thousand faces of some 500 bytes.
+    let (images, meshes) = (3.0 * 512.0 * 512.0 * 4.0, 1000.0 * 500.0);
+    assert!(peak < 4e6 + images + meshes + MEMORY_SLACK, "{} MB", peak / 1e6);
+    assert!(summary["ritree"]["trees"]["tree_bytes"].as_f64().expect("bytes") <= 4e6);
 }

@@ -105,16 +105,21 @@ pub struct MethodArgs {
     #[arg(long, value_name = "D", default_value_t = 0.05, allow_negative_numbers = true)]
     pub distance_threshold: f64,
     /// RI-tree: output directions farther apart than this are not interpolated (chords have none).
-    #[arg(long = "angular-threshold-deg", value_name = "DEG", default_value_t = 30.0)]
+    #[arg(
+        long = "angular-threshold-deg",
+        value_name = "DEG",
+        default_value_t = 30.0,
+        allow_negative_numbers = true
+    )]
     pub angular_threshold_deg: f64,
     /// RI-tree: cells of this depth are final.
     #[arg(long, value_name = "N", default_value_t = 28, value_parser = clap::value_parser!(u32).range(0..=60))]
     pub max_depth: u32,
     /// RI-tree: the most that nodes and samples of all trees may hold, megabytes.
-    #[arg(long, value_name = "MB", default_value_t = 100.0)]
+    #[arg(long, value_name = "MB", default_value_t = 100.0, allow_negative_numbers = true)]
     pub cache_mb: f64,
     /// RI-tree: the share of the cache that is kept when it is pruned.
-    #[arg(long, value_name = "SHARE", default_value_t = 0.3)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.3, allow_negative_numbers = true)]
     pub prune_keep: f64,
     /// RI-tree: bodies with fewer face planes are clipped instead.
     #[arg(long, value_name = "N", default_value_t = 48)]

@@ -54,7 +54,7 @@ impl Cache {
 
 /// The oldest stamp to keep so that the leaves from it on hold no more than `bytes`: least recently used go first.
 pub fn oldest_to_keep(mut stamps: Vec<(u32, usize)>, bytes: usize) -> u32 {
-    stamps.sort_unstable_by(|a, b| b.0.cmp(&a.0));
+    stamps.sort_unstable_by_key(|&(stamp, _)| std::cmp::Reverse(stamp));
     let mut kept = 0;
     let mut oldest = u32::MAX;
     for same_time in stamps.chunk_by(|a, b| a.0 == b.0) {

@@ -85,6 +85,12 @@ fn settings(distance_threshold: f64, max_depth: u32) -> Parameters {
     Parameters { distance_threshold, angular_threshold_deg: 30.0, max_depth }
 }
 
+fn ask_all(tree: &RiTree<Test>, cache: &Cache, points: &[LinePoint]) {
+    for &point in points {
+        let _ = tree.query(point, cache);
+    }
+}
+
 fn interpolated(answer: Option<Answer<Sample>>) -> f64 {
     match answer {
         Some(Answer::Interpolated(sample)) => sample.value,
@@ -142,7 +148,7 @@ fn a_smaller_threshold_gives_a_smaller_error_and_a_larger_tree() {
 fn beyond_the_deepest_level_no_cell_is_split() {
     let tree = RiTree::new(Test::smooth(|[s, ..]| s.powi(3)), settings(0.0, 9));
     let cache = roomy();
-    points(3, 500).into_iter().for_each(|point| drop(tree.query(point, &cache)));
+    ask_all(&tree, &cache, &points(3, 500));
     assert_eq!(tree.shape().leaves_by_depth.len(), 10);
 }
 
@@ -287,9 +293,9 @@ fn threads_share_a_tree_and_get_the_same_bits() {
 fn pruning_keeps_what_was_used_last() {
     let (mut tree, cache) = (RiTree::new(step(true), settings(0.01, 14)), roomy());
     let (old, new) = (points(8, 200), points(9, 20));
-    old.iter().for_each(|&point| drop(tree.query(point, &cache)));
+    ask_all(&tree, &cache, &old);
     tree.tick();
-    new.iter().for_each(|&point| drop(tree.query(point, &cache)));
+    ask_all(&tree, &cache, &new);
     let mut stamps = Vec::new();
     tree.collect_stamps(&mut stamps);
     let newest = stamps.iter().map(|s| s.0).max().expect("leaves");
@@ -297,7 +303,7 @@ fn pruning_keeps_what_was_used_last() {
     let leaves = |tree: &RiTree<Test>| tree.shape().leaves_by_depth.iter().sum::<u64>();
     assert!(leaves(&tree) <= 20);
     let before = tree.build_counts().nodes_expanded;
-    new.iter().for_each(|&point| drop(tree.query(point, &cache)));
+    ask_all(&tree, &cache, &new);
     assert_eq!(tree.build_counts().nodes_expanded, before, "what was used last is still there");
     tree.check_invariants();
 }

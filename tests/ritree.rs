@@ -1,0 +1,140 @@
+//! Projections by RI-trees: the laws of the tree, seen from outside.
+
+mod common;
+
+use chordfield::modes::Control;
+use chordfield::modes::project::{Found, Method, Projection, Projector, TreeSettings, Wanted};
+use chordfield::ritree::Parameters;
+use chordfield::scene::Scene;
+use common::{nested_balls, scene};
+
+const LENGTHS: Wanted = Wanted { lengths: true, attenuation: true, colour: true };
+
+fn cone_scene(pixels: u32) -> Scene {
+    // The second view is one of the first's lines walked the other way.
+    let text = nested_balls(pixels).replace("kind = \"parallel\"", "gantry_deg = [20, 200]\ncouch_deg = 15");
+    scene(&text).expect("a scene")
+}
+
+fn settings(cache_bytes: usize) -> TreeSettings {
+    let parameters = Parameters { distance_threshold: 0.02, max_depth: 20, ..Parameters::default() };
+    TreeSettings { parameters, cache_bytes, ..TreeSettings::default() }
+}
+
+fn projector(scene: &Scene, settings: TreeSettings) -> Projector<'_> {
+    Projector::new(scene, LENGTHS, None, Method::RiTree(settings)).expect("a projector")
+}
+
+fn view(projector: &Projector, scene: &Scene, index: usize) -> Projection {
+    let view = &scene.beam.views().expect("views")[index];
+    projector.project(view, index as u64, &Control::none()).expect("a projection")
+}
+
+fn bits(projection: &Projection) -> Vec<u32> {
+    let mut all: Vec<f32> = projection.own_length_mm(0);
+    all.extend(projection.own_length_mm(1));
+    all.extend(projection.line_integral());
+    all.extend(projection.colour().concat());
+    all.into_iter().map(f32::to_bits).collect()
+}
+
+#[test]
+fn images_are_the_same_bits_for_any_threads_order_and_cache_cold_or_warm() {
+    let scene = cone_scene(100);
+    let reference = projector(&scene, settings(100_000_000));
+    let expected = [0, 1].map(|i| bits(&view(&reference, &scene, i)));
+    assert_eq!(
+        [1, 0].map(|i| bits(&view(&reference, &scene, i))),
+        [expected[1].clone(), expected[0].clone()],
+        "warm"
+    );
+    for (threads, cache_bytes) in [(1, 100_000_000), (2, 200_000), (8, 200_000), (2, 0), (8, 20_000)] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| {
+            let projector = projector(&scene, settings(cache_bytes));
+            for i in [1, 0] {
+                assert_eq!(
+                    bits(&view(&projector, &scene, i)),
+                    expected[i],
+                    "{threads} threads, {cache_bytes} bytes"
+                );
+            }
+            projector.check_invariants();
+            assert!(projector.forest().expect("trees").tree_bytes <= cache_bytes);
+        });
+    }
+}
+
+#[test]
+fn the_error_falls_with_the_threshold_and_tracing_with_the_depth() {
+    let scene = cone_scene(200);
+    let views = scene.beam.views().expect("views");
+    let run = |distance_threshold: f64, max_depth: u32| {
+        let parameters = Parameters { distance_threshold, max_depth, ..Parameters::default() };
+        let projector = projector(&scene, TreeSettings { parameters, ..TreeSettings::default() });
+        let projection = view(&projector, &scene, 0);
+        let error = projector.spot_check(&views[..1], 20_000, 3).expect("trees").mean_mm;
+        let traced = projection.found().iter().filter(|&&found| found == Found::Traced).count();
+        (error, traced)
+    };
+    let errors = [0.25, 0.05, 0.01].map(|threshold| run(threshold, 24).0);
+    assert!(errors[0] > errors[1] && errors[1] > errors[2] && errors[2] < 0.5, "{errors:?}");
+    let traced = [16, 20, 24, 28].map(|depth| run(0.05, depth).1);
+    assert!(traced.windows(2).all(|w| w[1] < w[0]), "{traced:?}");
+}
+
+#[test]
+fn every_ray_is_accounted_for_and_trees_grow_only_where_rays_go() {
+    let scene = cone_scene(100);
+    let projector = projector(&scene, settings(100_000_000));
+    let projection = view(&projector, &scene, 0);
+    let (counts, queries) = (projection.counts(), projection.queries());
+    assert_eq!(
+        counts.organ_rays,
+        counts.organ_rays_exact
+            + counts.organ_rays_interpolated
+            + counts.organ_rays_skipped_by_bounds
+            + counts.organ_rays_skipped_unneeded
+    );
+    assert_eq!(queries.interpolated, counts.organ_rays_interpolated);
+    assert_eq!(
+        queries.queries,
+        queries.interpolated
+            + queries.traced_silhouette
+            + queries.traced_classes
+            + queries.traced_angle
+            + queries.traced_guard
+    );
+    assert!(queries.interpolated > 4 * queries.traced_silhouette, "{queries:?}");
+    let forest = projector.forest().expect("trees");
+    assert_eq!(forest.trees, 2);
+    assert_eq!(
+        forest.shape.leaves_by_depth.iter().sum::<u64>(),
+        forest.shape.smooth_leaves + forest.shape.empty_leaves + forest.shape.traced_leaves
+    );
+    // The opposite view walks the same lines backwards: a symmetric attribute needs no new sample for most.
+    let _ = view(&projector, &scene, 1);
+    let after = projector.forest().expect("trees").build.samples_taken;
+    assert!(after < 2 * forest.build.samples_taken);
+
+    // Bodies with few planes are clipped.
+    let without = TreeSettings { least_planes: 10_000, ..settings(100_000_000) };
+    let projector = self::projector(&scene, without);
+    let projection = view(&projector, &scene, 0);
+    assert_eq!((projection.queries().queries, projector.forest().expect("a forest").trees), (0, 0));
+    let exact = Projector::new(&scene, LENGTHS, None, Method::Exact).expect("a projector");
+    assert_eq!(bits(&projection), bits(&view(&exact, &scene, 0)), "all traced is exact");
+}
+
+#[test]
+fn a_source_inside_the_box_is_traced() {
+    let text = nested_balls(32).replace(
+        "kind = \"parallel\"",
+        "source_mm = [0, 0, 0]\ndetector_centre_mm = [0, 300, 0]\ncolumn_direction = [1, 0, 0]\nrow_direction = [0, 0, -1]",
+    );
+    let scene = scene(&text).expect("a scene");
+    let near = view(&projector(&scene, settings(100_000_000)), &scene, 0);
+    let exact = Projector::new(&scene, LENGTHS, None, Method::Exact).expect("a projector");
+    assert_eq!(near.own_length_mm(0), view(&exact, &scene, 0).own_length_mm(0));
+    assert!(near.queries().traced_source_or_target_inside > 0);
+}
