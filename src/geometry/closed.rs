@@ -46,7 +46,10 @@ impl ClosedMesh {
         if mesh.faces.is_empty() {
             return Err(MeshFault::Empty);
         }
-        drop_unused_vertices(&mut mesh, &mut notices);
+        match mesh.drop_unused_vertices() {
+            0 => {}
+            unused => notices.push(Notice::UnusedVertices(unused)),
+        }
 
         let mut edges = Edges::new(&mesh)?;
         let turned = edges.make_winding_consistent(&mut mesh)?;
@@ -245,24 +248,6 @@ fn check_numbers(mesh: &TriMesh) -> Result<(), MeshFault> {
 /// Coordinates beyond a thousand million kilometres leave the range in which the exact predicates were checked, and hold no
 /// patient.
 const LARGEST_COORDINATE_MM: f64 = 1e15;
-
-fn drop_unused_vertices(mesh: &mut TriMesh, notices: &mut Vec<Notice>) {
-    const UNUSED: u32 = u32::MAX;
-    let mut new_index = vec![UNUSED; mesh.vertices.len()];
-    let mut kept = Vec::with_capacity(mesh.vertices.len());
-    for vertex in mesh.faces.iter_mut().flatten() {
-        let index = &mut new_index[*vertex as usize];
-        if *index == UNUSED {
-            *index = kept.len() as u32;
-            kept.push(mesh.vertices[*vertex as usize]);
-        }
-        *vertex = *index;
-    }
-    if kept.len() < mesh.vertices.len() {
-        notices.push(Notice::UnusedVertices(mesh.vertices.len() - kept.len()));
-    }
-    mesh.vertices = kept;
-}
 
 fn face_boxes(mesh: &TriMesh) -> Vec<Bounds> {
     mesh.triangles().map(Bounds::of).collect()
