@@ -107,3 +107,30 @@ fn densities_that_no_matter_has_are_refused_at_their_line() {
         assert_eq!(line, text.lines().position(|l| l.contains("density")).map(|i| i + 1));
     }
 }
+
+#[test]
+fn shapes_of_one_organ_that_overlap_flush_are_refused_and_face_to_face_are_not() {
+    let organ = |low: f64| {
+        let high = low + 40.0;
+        format!(
+            r#"
+[[organ]]
+name = "slab"
+material = "water"
+shapes = [
+    {{ kind = "box", min_mm = [0, 0, 0], max_mm = [40, 20, 20] }},
+    {{ kind = "box", min_mm = [{low:?}, 0, 0], max_mm = [{high:?}, 20, 20] }},
+]
+"#
+        )
+    };
+    let (message, line) = complaints(&organ(30.0)).remove(0);
+    assert!(
+        message.contains("organ `slab`")
+            && message.contains("components 1 and 2 of 2 overlap")
+            && message.contains("near ("),
+        "{message}"
+    );
+    assert_eq!(line, Some(5));
+    assert!(scene(&organ(40.0)).is_ok());
+}

@@ -19,8 +19,8 @@ use super::{Bounds, TriMesh};
 /// A closed, 2-manifold, outward-looking surface, and the box hierarchy over its faces.
 ///
 /// Several components are allowed: side by side, or as a cavity (inward-looking, inside another). That the surface
-/// does not cross itself is proved separately, by `self_crossing`, because bodies
-/// made as convex hulls cannot.
+/// does not cross itself and that its components share no volume is proved separately, by `self_crossing` and
+/// `check_components`, because bodies made as convex hulls cannot.
 #[derive(Clone, Debug)]
 pub struct ClosedMesh {
     mesh: TriMesh,
@@ -83,15 +83,22 @@ impl ClosedMesh {
         self.component_count
     }
 
+    /// The component of each face, numbered in the order of their first faces.
+    pub(super) fn component_of_face(&self) -> &[u32] {
+        &self.components
+    }
+
     /// One face of each component: the first in the mesh's order.
     pub fn first_faces(&self) -> impl Iterator<Item = usize> + '_ {
         // Components are numbered in the order of their first faces.
         let mut next = 0;
-        self.components.iter().enumerate().filter_map(move |(face, &component)| {
+        let firsts = self.components.iter().enumerate().filter_map(move |(face, &component)| {
             let is_first = component == next;
             next += u32::from(is_first);
             is_first.then_some(face)
-        })
+        });
+        // After the last, the rest of a large mesh need not be looked at.
+        firsts.take(self.component_count)
     }
 
     /// The number of handles of a surface of one component: 0 for a ball, 1 for a torus.

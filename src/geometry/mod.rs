@@ -3,6 +3,7 @@
 mod bounds;
 mod boxtree;
 mod closed;
+mod components;
 mod convex;
 mod fault;
 mod hull;
@@ -19,6 +20,7 @@ mod topology;
 pub use bounds::Bounds;
 pub use boxtree::BoxTree;
 pub use closed::ClosedMesh;
+pub use components::check_components;
 pub use convex::{ConvexMesh, NotConvex, Plane, rounding_tolerance_mm};
 pub use fault::{MeshFault, Notice, Place};
 pub use hull::{HULL_TOLERANCE, HullError, convex_hull};

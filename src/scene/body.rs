@@ -10,7 +10,7 @@ use super::schema::MeshSpec;
 use super::shape::{Shape, frame::Frame};
 use crate::error::{Error, Result};
 use crate::exact::Body;
-use crate::geometry::{ClosedMesh, MeshFault, TriMesh, self_crossing};
+use crate::geometry::{ClosedMesh, MeshFault, TriMesh, check_components, self_crossing};
 
 /// A body and what was mended to make it one.
 pub struct Proved {
@@ -20,7 +20,7 @@ pub struct Proved {
     pub notices: Vec<String>,
 }
 
-/// Proves that `mesh` bounds a body: closed, two-manifold, oriented, not crossing itself.
+/// Proves that `mesh` bounds a body: closed, two-manifold, oriented, not crossing itself, no volume counted twice.
 ///
 /// # Errors
 /// The first fault, about `subject`, with its place and a remedy.
@@ -29,10 +29,11 @@ pub fn prove(subject: &str, mesh: TriMesh) -> Result<Proved> {
     let (surface, notices) = ClosedMesh::new(mesh).map_err(fault)?;
     let body = Body::new(surface);
     // A convex surface cannot cross itself; the search is for the others.
-    if body.convexity().is_err()
-        && let Some((pairs, place)) = self_crossing(body.surface())
-    {
-        return Err(fault(MeshFault::SelfCrossing { pairs, place }));
+    if body.convexity().is_err() {
+        if let Some((pairs, place)) = self_crossing(body.surface()) {
+            return Err(fault(MeshFault::SelfCrossing { pairs, place }));
+        }
+        check_components(body.surface()).map_err(fault)?;
     }
     Ok(Proved { body, notices: notices.iter().map(ToString::to_string).collect() })
 }
