@@ -95,6 +95,12 @@ fn sizes_that_overflow_are_refused_before_memory_is() {
     let (message, line) = complaint("pixels = [16, 16]", "pixels = [4000000000, 4000000000]");
     assert!(message.contains("beam"), "{message}");
     assert_eq!(line, line_of("pixels"));
+    // 46340² is just below 2³¹: no count overflows, but no desk computer has the memory.
+    let (message, line) = complaint("pixels = [16, 16]", "pixels = [46340, 46340]");
+    assert!(message.contains("46340 × 46340 pixels would take some 103.1 GB"), "{message}");
+    assert_eq!(line, line_of("pixels"));
+    let (message, _) = complaint("pixels = [16, 16]", "pixels = [0, 16]");
+    assert!(message.contains("no image"), "{message}");
 }
 
 #[test]
