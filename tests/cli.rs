@@ -177,6 +177,7 @@ fn bad_input_exits_2_with_the_place_and_leaves_nothing() {
         (&["project", "balls.toml", "--gantry", "0..360"], "--gantry"),
         (&["project", "balls.toml", "--energy-kev", "5"], "5"),
         (&["project", "balls.toml", "--size", "0x64"], "pixels"),
+        (&["project", "balls.toml", "--size", "46340x46340"], "103.1 GB"),
         (&["project", "balls.toml", "--photons", "-1"], "photon"),
         (&["phantom", "show", "nobody"], "nobody"),
     ] {
@@ -185,6 +186,26 @@ fn bad_input_exits_2_with_the_place_and_leaves_nothing() {
         assert!(err(&run).contains(words), "{args:?}: {}", err(&run));
     }
     assert!(!folder.path().join("out").exists());
+}
+
+#[test]
+fn another_tube_voltage_still_passes_the_scenes_filters() {
+    let folder = folder();
+    let with = |spectrum: &str| nested_balls(16).replace("energy_keV = 60", spectrum);
+    let filters = "filters = [{ material = \"bone_cortical\", thickness_mm = 5 }]";
+    std::fs::write(folder.path().join("a.toml"), with(&format!("kvp = 80\n{filters}"))).expect("a scene");
+    std::fs::write(folder.path().join("b.toml"), with(&format!("kvp = 120\n{filters}"))).expect("a scene");
+    std::fs::write(folder.path().join("bare.toml"), with("kvp = 120")).expect("a scene");
+    let p = |scene: &str, more: &[&str]| {
+        let out = format!("out-{scene}");
+        let args = [&["project", scene, "--write", "p", "-o", &out], more].concat();
+        let run = chordfield(folder.path(), &args);
+        assert_eq!(run.status.code(), Some(0), "{}", err(&run));
+        MetaImage::read(&folder.path().join(out).join("balls-g000-p.mha")).values
+    };
+    let changed = p("a.toml", &["--kvp", "120"]);
+    assert_eq!(changed, p("b.toml", &[]));
+    assert_ne!(changed, p("bare.toml", &[]));
 }
 
 #[test]

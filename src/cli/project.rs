@@ -101,10 +101,10 @@ pub fn open(scene: &str) -> Result<Scene> {
 fn change(scene: &mut Scene, beam: &BeamArgs, photons: &PhotonArgs) -> Result<()> {
     scene.beam = scene.beam.clone().overridden_by(beam_spec(beam)?);
     if let Some(energy) = photons.energy_kev {
-        scene.spectrum = Spectrum::mono(energy)?;
+        scene.replace_source(Spectrum::mono(energy)?)?;
     }
     if let Some(kvp) = photons.kvp {
-        scene.spectrum = Spectrum::tungsten(kvp)?;
+        scene.replace_source(Spectrum::tungsten(kvp)?)?;
     }
     if let Some(response) = photons.response {
         scene.response = response.into();

@@ -92,6 +92,7 @@ impl Scene {
                 organs,
                 beam: spec.beam,
                 spectrum,
+                filters: spec.spectrum.filters,
                 response: spec.spectrum.response,
             }),
             _ => Err(Error::several(errors)),
