@@ -301,23 +301,55 @@ fn an_exported_phantom_has_the_same_lengths_to_the_last_bit() {
     assert!(out(&shown).lines().count() >= 4 && out(&shown).contains("adult-skeleton"));
 }
 
-#[cfg(unix)]
+/// A scene that takes many seconds to load: balls of very many faces, each crossing all others.
+#[cfg(target_os = "linux")]
+fn slow_scene() -> String {
+    let ball = |name: &str, x: f64| {
+        format!(
+            "[[organ]]\nname = \"{name}\"\nmaterial = \"water\"\n\
+             shape = {{ kind = \"ellipsoid\", half_axes_mm = [50, 50, 50], faces = 100000, move_mm = [{x:?}, 0, 0] }}\n"
+        )
+    };
+    (0..12).map(|i| ball(&format!("ball {i}"), f64::from(i))).collect()
+}
+
+/// Whether the process catches SIGINT, by the mask that the kernel shows.
+#[cfg(target_os = "linux")]
+fn catches_interrupts(process: u32) -> bool {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask & 0b10 != 0)
+}
+
+#[cfg(target_os = "linux")]
 #[test]
 fn interrupting_a_run_that_still_loads_its_scene_stops_it_at_once() {
     let folder = folder();
-    let pipe = folder.path().join("never.toml");
-    assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo runs").success());
+    std::fs::write(folder.path().join("slow.toml"), slow_scene()).expect("a scene");
     for command in ["project", "check"] {
         let mut child = Command::new(env!("CARGO_BIN_EXE_chordfield"))
-            .args([command, &pipe.to_string_lossy()])
+            .current_dir(folder.path())
+            .args([command, "slow.toml"])
             .stdin(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
             .expect("the program starts");
-        // Opening the pipe to write waits for the program to read: it is loading now.
-        let _never_written = std::fs::OpenOptions::new().write(true).open(&pipe).expect("the program reads");
+        while !catches_interrupts(child.id()) && child.try_wait().expect("a status").is_none() {
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
         let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
         assert!(kill.expect("kill runs").success());
         assert_eq!(child.wait().expect("an end").code(), Some(130), "{command}");
     }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_named_pipe_is_refused_instead_of_waited_for() {
+    let folder = folder();
+    let pipe = folder.path().join("never.toml");
+    assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo runs").success());
+    let run = chordfield(folder.path(), &["project", "never.toml"]);
+    assert_eq!(run.status.code(), Some(2));
+    assert!(err(&run).contains("never.toml: this is not a regular file"), "{}", err(&run));
 }

@@ -21,6 +21,7 @@ pub mod panel;
 pub mod phantoms;
 mod problem;
 pub mod ranges;
+mod regular_file;
 mod schema;
 pub mod shape;
 mod text;
