@@ -13,6 +13,7 @@ use glam::DVec3;
 use super::boxtree::BoxTree;
 use super::fault::{MeshFault, Notice};
 use super::inside::{Side, crossings_ahead, side_of_surface};
+use super::rounding::rounding_tolerance_mm;
 use super::topology::{Components, Edges};
 use super::{Bounds, TriMesh};
 
@@ -28,6 +29,7 @@ pub struct ClosedMesh {
     component_count: usize,
     edges: Edges,
     tree: BoxTree,
+    rounding_tolerance_mm: f64,
 }
 
 impl ClosedMesh {
@@ -58,9 +60,30 @@ impl ClosedMesh {
         }
         let Components { of_face, count } = edges.components(mesh.faces.len());
         let tree = BoxTree::build(&face_boxes(&mesh));
-        let mut closed = Self { mesh, components: of_face, component_count: count, edges, tree };
+        let rounding_tolerance_mm = rounding_tolerance_mm(&mesh.vertices, None);
+        let mut closed =
+            Self { mesh, components: of_face, component_count: count, edges, tree, rounding_tolerance_mm };
         closed.turn_outward(&mut notices)?;
         Ok((closed, notices))
+    }
+
+    /// The same surface, known to have been written on a grid of this spacing, mm: see
+    /// [`written_grid`](super::written_grid). Without, the grid is taken from its coordinates, which shows it no more
+    /// once they were scaled or turned.
+    pub fn with_written_grid_mm(mut self, grid_mm: f64) -> Self {
+        self.rounding_tolerance_mm = rounding_tolerance_mm(&self.mesh.vertices, Some(grid_mm));
+        self
+    }
+
+    /// The same surface, a part of `whole`, whose rounding it shares.
+    pub(super) fn with_rounding_of(mut self, whole: &Self) -> Self {
+        self.rounding_tolerance_mm = whole.rounding_tolerance_mm;
+        self
+    }
+
+    /// How far rounding of its vertices can make a convex surface's vertex stand out of a face's plane, mm.
+    pub fn rounding_tolerance_mm(&self) -> f64 {
+        self.rounding_tolerance_mm
     }
 
     /// The triangles, outward.

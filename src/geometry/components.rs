@@ -31,7 +31,7 @@ pub fn check_components(surface: &ClosedMesh) -> Result<(), MeshFault> {
     let is_solid: Vec<bool> = parts.iter().map(|part| part.signed_volume() > 0.0).collect();
     let bodies: Vec<ClosedMesh> = parts
         .into_iter()
-        .map(|part| ClosedMesh::new(part).map(|(body, _)| body))
+        .map(|part| ClosedMesh::new(part).map(|(body, _)| body.with_rounding_of(surface)))
         .collect::<Result<_, _>>()?;
     let pairs = touching_boxes(&bodies);
     let relations: Vec<Relation> = pairs.par_iter().map(|&(i, j)| relation(&bodies[i], &bodies[j])).collect();
