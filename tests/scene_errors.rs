@@ -140,3 +140,12 @@ shapes = [
     assert_eq!(line, Some(5));
     assert!(scene(&organ(40.0)).is_ok());
 }
+
+#[test]
+fn group_and_groups_together_are_refused() {
+    let text = "[[organ]]\nname = \"a\"\nmaterial = \"water\"\n\
+                mesh = { file = \"a.obj\", group = \"x\", groups = [\"y\"] }\n";
+    let (message, line) = complaints(text).remove(0);
+    assert!(message.contains("both `group` and `groups` are given"), "{message}");
+    assert_eq!(line, Some(4));
+}

@@ -66,7 +66,7 @@ pub fn of_mesh(spec: &MeshSpec, folder: &Folder) -> Result<Proved> {
     let path = folder.resolve(&spec.file)?;
     let scale = spec.units.mm();
     let options = ReadOptions {
-        groups: spec.groups.clone().or_else(|| spec.group.clone().map(|g| vec![g])),
+        groups: spec.chosen_groups()?,
         weld_file_units: spec.weld_mm / scale,
         ..ReadOptions::default()
     };

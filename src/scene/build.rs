@@ -166,8 +166,7 @@ fn organ(spec: &OrganSpec, index: usize, text: &SceneText, folder: &Folder) -> R
             Origin::Shapes(shapes.to_vec()),
         ),
         (None, [], Some(mesh)) => {
-            let groups =
-                mesh.groups.clone().or_else(|| mesh.group.clone().map(|g| vec![g])).unwrap_or_default();
+            let groups = mesh.chosen_groups().map_err(|e| at("mesh", e))?.unwrap_or_default();
             let proved = body::of_mesh(mesh, folder).map_err(|e| at("mesh", e))?;
             (proved, Origin::Mesh { file: mesh.file.clone(), groups })
         }
