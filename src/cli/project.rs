@@ -74,8 +74,7 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
         record.display()
     ));
     if args.json {
-        let text = serde_json::to_string_pretty(summary).unwrap_or_default();
-        print(out, &format!("{text}\n"))?;
+        print(out, &json::text(summary)?)?;
     }
     Ok(())
 }
