@@ -252,6 +252,22 @@ fn a_closed_pipe_ends_quietly() {
     assert_eq!((run.status.code(), err(&run).as_str()), (Some(0), ""));
 }
 
+#[test]
+fn a_run_that_fails_half_way_leaves_no_record_not_even_an_earlier_runs() {
+    let folder = folder();
+    let project =
+        || chordfield(folder.path(), &["project", "balls.toml", "--write", "p", "--gantry", "0,90"]);
+    assert_eq!(project().status.code(), Some(0));
+    // A folder where the second view's file belongs.
+    let in_the_way = folder.path().join("out/balls-g090-p.mha");
+    std::fs::remove_file(&in_the_way).expect("removed");
+    std::fs::create_dir(&in_the_way).expect("a folder");
+    let run = project();
+    assert_eq!(run.status.code(), Some(2));
+    assert!(err(&run).contains("balls-g090-p.mha"), "{}", err(&run));
+    assert_eq!(files(&folder.path().join("out")), ["balls-g000-p.mha", "balls-g090-p.mha"]);
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn an_interrupt_exits_130_and_leaves_no_partial_file() {

@@ -19,6 +19,9 @@ use crate::scene::ranges::Angles;
 use crate::scene::{Given, Scene, View, phantoms};
 
 /// Projects a scene and writes what was asked for; the summary goes to `out` as JSON if asked for.
+///
+/// The record is written last, and one of an earlier run goes first: a folder with a record holds a whole run, one
+/// without holds what an error or an interruption left, whole files of some views.
 pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result<()> {
     let mut stages = Stages::start();
     let mut scene = open(&args.scene)?;
@@ -30,6 +33,8 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
     let projector = Projector::new(&scene, wanted(&products), noise)?;
     session.begin_writing();
     create_folder(&args.output)?;
+    let record = args.output.join(format!("{}.json", projection::safe_name(&scene.name)));
+    remove_stale(&record)?;
     stages.end("load");
 
     let rays: u64 = views.iter().map(pixels).sum();
@@ -64,7 +69,6 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
     };
     let views = records.into_iter().map(|(view, label, files)| ViewRecord::of(view, label, files)).collect();
     let sidecar = Sidecar::new(&scene, noise, views, summary);
-    let record = args.output.join(format!("{}.json", projection::safe_name(&scene.name)));
     json::write(&record, &sidecar)?;
     let summary = sidecar.summary();
     session.remark(&format!(
@@ -77,6 +81,14 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
         print(out, &json::text(summary)?)?;
     }
     Ok(())
+}
+
+/// Removes an earlier run's record, which would describe files that are about to change.
+fn remove_stale(record: &Path) -> Result<()> {
+    match std::fs::remove_file(record) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io("replace", record, e)),
+        _ => Ok(()),
+    }
 }
 
 /// The scene of a file, or the phantom of that name.
