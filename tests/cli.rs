@@ -178,6 +178,7 @@ fn bad_input_exits_2_with_the_place_and_leaves_nothing() {
         (&["project", "balls.toml", "--gantry", "0..360"], "--gantry"),
         (&["project", "balls.toml", "--energy-kev", "5"], "5"),
         (&["project", "balls.toml", "--size", "0x64"], "pixels"),
+        (&["project", "balls.toml", "--size", "46340x46340"], "103.1 GB"),
         (&["project", "balls.toml", "--photons", "-1"], "photon"),
         (&["phantom", "show", "nobody"], "nobody"),
     ] {
@@ -186,6 +187,26 @@ fn bad_input_exits_2_with_the_place_and_leaves_nothing() {
         assert!(err(&run).contains(words), "{args:?}: {}", err(&run));
     }
     assert!(!folder.path().join("out").exists());
+}
+
+#[test]
+fn another_tube_voltage_still_passes_the_scenes_filters() {
+    let folder = folder();
+    let with = |spectrum: &str| nested_balls(16).replace("energy_keV = 60", spectrum);
+    let filters = "filters = [{ material = \"bone_cortical\", thickness_mm = 5 }]";
+    std::fs::write(folder.path().join("a.toml"), with(&format!("kvp = 80\n{filters}"))).expect("a scene");
+    std::fs::write(folder.path().join("b.toml"), with(&format!("kvp = 120\n{filters}"))).expect("a scene");
+    std::fs::write(folder.path().join("bare.toml"), with("kvp = 120")).expect("a scene");
+    let p = |scene: &str, more: &[&str]| {
+        let out = format!("out-{scene}");
+        let args = [&["project", scene, "--write", "p", "-o", &out], more].concat();
+        let run = chordfield(folder.path(), &args);
+        assert_eq!(run.status.code(), Some(0), "{}", err(&run));
+        MetaImage::read(&folder.path().join(out).join("balls-g000-p.mha")).values
+    };
+    let changed = p("a.toml", &["--kvp", "120"]);
+    assert_eq!(changed, p("b.toml", &[]));
+    assert_ne!(changed, p("bare.toml", &[]));
 }
 
 #[test]
@@ -230,6 +251,22 @@ fn a_closed_pipe_ends_quietly() {
     drop(child.stdout.take());
     let run = child.wait_with_output().expect("it ends");
     assert_eq!((run.status.code(), err(&run).as_str()), (Some(0), ""));
+}
+
+#[test]
+fn a_run_that_fails_half_way_leaves_no_record_not_even_an_earlier_runs() {
+    let folder = folder();
+    let project =
+        || chordfield(folder.path(), &["project", "balls.toml", "--write", "p", "--gantry", "0,90"]);
+    assert_eq!(project().status.code(), Some(0));
+    // A folder where the second view's file belongs.
+    let in_the_way = folder.path().join("out/balls-g090-p.mha");
+    std::fs::remove_file(&in_the_way).expect("removed");
+    std::fs::create_dir(&in_the_way).expect("a folder");
+    let run = project();
+    assert_eq!(run.status.code(), Some(2));
+    assert!(err(&run).contains("balls-g090-p.mha"), "{}", err(&run));
+    assert_eq!(files(&folder.path().join("out")), ["balls-g000-p.mha", "balls-g090-p.mha"]);
 }
 
 #[cfg(target_os = "linux")]
@@ -281,21 +318,42 @@ fn an_exported_phantom_has_the_same_lengths_to_the_last_bit() {
     assert!(out(&shown).lines().count() >= 4 && out(&shown).contains("adult-skeleton"));
 }
 
-#[cfg(unix)]
+/// A scene that takes many seconds to load: balls of very many faces, each crossing all others.
+#[cfg(target_os = "linux")]
+fn slow_scene() -> String {
+    let ball = |name: &str, x: f64| {
+        format!(
+            "[[organ]]\nname = \"{name}\"\nmaterial = \"water\"\n\
+             shape = {{ kind = \"ellipsoid\", half_axes_mm = [50, 50, 50], faces = 100000, move_mm = [{x:?}, 0, 0] }}\n"
+        )
+    };
+    (0..12).map(|i| ball(&format!("ball {i}"), f64::from(i))).collect()
+}
+
+/// Whether the process catches SIGINT, by the mask that the kernel shows.
+#[cfg(target_os = "linux")]
+fn catches_interrupts(process: u32) -> bool {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask & 0b10 != 0)
+}
+
+#[cfg(target_os = "linux")]
 #[test]
 fn interrupting_a_run_that_still_loads_its_scene_stops_it_at_once() {
     let folder = folder();
-    let pipe = folder.path().join("never.toml");
-    assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo runs").success());
+    std::fs::write(folder.path().join("slow.toml"), slow_scene()).expect("a scene");
     for command in ["project", "check"] {
         let mut child = Command::new(env!("CARGO_BIN_EXE_chordfield"))
-            .args([command, &pipe.to_string_lossy()])
+            .current_dir(folder.path())
+            .args([command, "slow.toml"])
             .stdin(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
             .expect("the program starts");
-        // Opening the pipe to write waits for the program to read: it is loading now.
-        let _never_written = std::fs::OpenOptions::new().write(true).open(&pipe).expect("the program reads");
+        while !catches_interrupts(child.id()) && child.try_wait().expect("a status").is_none() {
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
         let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
         assert!(kill.expect("kill runs").success());
         assert_eq!(child.wait().expect("an end").code(), Some(130), "{command}");
@@ -374,4 +432,15 @@ fn peak_memory_stays_under_cache_plus_images_plus_meshes_plus_slack() {
     let (images, meshes) = (3.0 * 512.0 * 512.0 * 4.0, 1000.0 * 500.0);
     assert!(peak < 4e6 + images + meshes + MEMORY_SLACK, "{} MB", peak / 1e6);
     assert!(summary["ritree"]["trees"]["tree_bytes"].as_f64().expect("bytes") <= 4e6);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_named_pipe_is_refused_instead_of_waited_for() {
+    let folder = folder();
+    let pipe = folder.path().join("never.toml");
+    assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo runs").success());
+    let run = chordfield(folder.path(), &["project", "never.toml"]);
+    assert_eq!(run.status.code(), Some(2));
+    assert!(err(&run).contains("never.toml: this is not a regular file"), "{}", err(&run));
 }

@@ -95,6 +95,12 @@ fn sizes_that_overflow_are_refused_before_memory_is() {
     let (message, line) = complaint("pixels = [16, 16]", "pixels = [4000000000, 4000000000]");
     assert!(message.contains("beam"), "{message}");
     assert_eq!(line, line_of("pixels"));
+    // 46340² is just below 2³¹: no count overflows, but no desk computer has the memory.
+    let (message, line) = complaint("pixels = [16, 16]", "pixels = [46340, 46340]");
+    assert!(message.contains("46340 × 46340 pixels would take some 103.1 GB"), "{message}");
+    assert_eq!(line, line_of("pixels"));
+    let (message, _) = complaint("pixels = [16, 16]", "pixels = [0, 16]");
+    assert!(message.contains("no image"), "{message}");
 }
 
 #[test]
@@ -106,4 +112,40 @@ fn densities_that_no_matter_has_are_refused_at_their_line() {
         assert!(message.contains("is no density"), "{density}: {message}");
         assert_eq!(line, text.lines().position(|l| l.contains("density")).map(|i| i + 1));
     }
+}
+
+#[test]
+fn shapes_of_one_organ_that_overlap_flush_are_refused_and_face_to_face_are_not() {
+    let organ = |low: f64| {
+        let high = low + 40.0;
+        format!(
+            r#"
+[[organ]]
+name = "slab"
+material = "water"
+shapes = [
+    {{ kind = "box", min_mm = [0, 0, 0], max_mm = [40, 20, 20] }},
+    {{ kind = "box", min_mm = [{low:?}, 0, 0], max_mm = [{high:?}, 20, 20] }},
+]
+"#
+        )
+    };
+    let (message, line) = complaints(&organ(30.0)).remove(0);
+    assert!(
+        message.contains("organ `slab`")
+            && message.contains("components 1 and 2 of 2 overlap")
+            && message.contains("near ("),
+        "{message}"
+    );
+    assert_eq!(line, Some(5));
+    assert!(scene(&organ(40.0)).is_ok());
+}
+
+#[test]
+fn group_and_groups_together_are_refused() {
+    let text = "[[organ]]\nname = \"a\"\nmaterial = \"water\"\n\
+                mesh = { file = \"a.obj\", group = \"x\", groups = [\"y\"] }\n";
+    let (message, line) = complaints(text).remove(0);
+    assert!(message.contains("both `group` and `groups` are given"), "{message}");
+    assert_eq!(line, Some(4));
 }

@@ -163,7 +163,7 @@ pub struct BeamArgs {
     /// The isocentre, patient LPS, mm.
     #[arg(long = "isocentre-mm", value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
     pub isocentre_mm: Option<[f64; 3]>,
-    /// Detector pixels.
+    /// Detector pixels, at most 8192 × 8192 in all (some 48 bytes of memory each).
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = parse_pixels)]
     pub size: Option<[u32; 2]>,
     /// Detector width and height, mm.

@@ -11,6 +11,7 @@ use super::args::CheckArgs;
 use super::{Outcome, print, project};
 use crate::error::{Error, Result};
 use crate::exact::Body;
+use crate::output::json;
 use crate::output::sidecar::OrganRecord;
 use crate::scene::Scene;
 use crate::scene::body::{self, Proved};
@@ -21,7 +22,7 @@ use crate::scene::shape::Shape;
 pub fn run(args: &CheckArgs, out: &mut dyn Write) -> Result<Outcome> {
     let findings: Vec<Finding> = args.files.iter().map(|file| Finding::of(file)).collect();
     let text = if args.json {
-        format!("{}\n", serde_json::to_string_pretty(&findings).unwrap_or_default())
+        json::text(&findings)?
     } else {
         findings.iter().map(Finding::words).collect::<Vec<_>>().join("\n")
     };

@@ -23,6 +23,9 @@ use crate::scene::{Given, Scene, View, phantoms};
 const SPOT_CHECK_RAYS: usize = 20_000;
 
 /// Projects a scene and writes what was asked for; the summary goes to `out` as JSON if asked for.
+///
+/// The record is written last, and one of an earlier run goes first: a folder with a record holds a whole run, one
+/// without holds what an error or an interruption left, whole files of some views.
 pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result<()> {
     let mut stages = Stages::start();
     let mut scene = open(&args.scene)?;
@@ -35,6 +38,8 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
     let projector = Projector::new(&scene, wanted(&products), noise, method)?;
     session.begin_writing();
     create_folder(&args.output)?;
+    let record = args.output.join(format!("{}.json", projection::safe_name(&scene.name)));
+    remove_stale(&record)?;
     stages.end("load");
 
     let rays: u64 = views.iter().map(pixels).sum();
@@ -73,7 +78,6 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
     };
     let views = records.into_iter().map(|(view, label, files)| ViewRecord::of(view, label, files)).collect();
     let sidecar = Sidecar::new(&scene, noise, views, summary);
-    let record = args.output.join(format!("{}.json", projection::safe_name(&scene.name)));
     json::write(&record, &sidecar)?;
     let summary = sidecar.summary();
     session.remark(&format!(
@@ -83,10 +87,17 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
         record.display()
     ));
     if args.json {
-        let text = serde_json::to_string_pretty(summary).unwrap_or_default();
-        print(out, &format!("{text}\n"))?;
+        print(out, &json::text(summary)?)?;
     }
     Ok(())
+}
+
+/// Removes an earlier run's record, which would describe files that are about to change.
+fn remove_stale(record: &Path) -> Result<()> {
+    match std::fs::remove_file(record) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io("replace", record, e)),
+        _ => Ok(()),
+    }
 }
 
 /// The scene of a file, or the phantom of that name.
@@ -110,10 +121,10 @@ pub fn open(scene: &str) -> Result<Scene> {
 fn change(scene: &mut Scene, beam: &BeamArgs, photons: &PhotonArgs) -> Result<()> {
     scene.beam = scene.beam.clone().overridden_by(beam_spec(beam)?);
     if let Some(energy) = photons.energy_kev {
-        scene.spectrum = Spectrum::mono(energy)?;
+        scene.replace_source(Spectrum::mono(energy)?)?;
     }
     if let Some(kvp) = photons.kvp {
-        scene.spectrum = Spectrum::tungsten(kvp)?;
+        scene.replace_source(Spectrum::tungsten(kvp)?)?;
     }
     if let Some(response) = photons.response {
         scene.response = response.into();

@@ -4,7 +4,7 @@ use std::io::IsTerminal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
 
 /// One run of the program.
 pub struct Session {
@@ -40,14 +40,17 @@ impl Session {
         move || cancel.swap(true, Ordering::Relaxed) || !writes.load(Ordering::Relaxed)
     }
 
-    /// A progress bar over `total` of `unit`, on a terminal only.
+    /// A progress bar over `total` of `unit`, on a terminal only. It goes when it is dropped, so that an error's message
+    /// stands alone.
     pub fn progress(&self, total: u64, unit: &str) -> ProgressBar {
         let target = if self.talks { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let template = format!(
             "{{msg:20}} [{{bar:32}}] {{percent:>3}} %  {{human_pos}} of {{human_len}} {unit}, {{eta}} left"
         );
         let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
-        ProgressBar::with_draw_target(Some(total), target).with_style(style.progress_chars("█▌ "))
+        ProgressBar::with_draw_target(Some(total), target)
+            .with_style(style.progress_chars("█▌ "))
+            .with_finish(ProgressFinish::AndClear)
     }
 
     /// A remark for a person watching; nothing when piped or quiet.

@@ -12,8 +12,9 @@ use glam::DVec3;
 
 /// Finds the parts of `line` inside `surface`, mm along `dir`, in order and disjoint; written to `parts`.
 ///
-/// The body is closed: a line in a face's plane counts its length in the face. The sum of the parts is exact for
-/// a line moved by no more than γ₈ of its distance to the body.
+/// The body is closed: a line in a face's plane counts its length in the face. The parts are exact for
+/// a surface each of whose vertices has moved by no more than γ₈ of its distance from the line's origin: a vertex is rounded
+/// by itself, alike for all its faces, so neighbouring vertices may move apart, and no one shift of the line stands for all.
 pub fn chords(surface: &ClosedMesh, line: &Line, parts: &mut Vec<Interval>) {
     parts.clear();
     let shear = Shear::new(line);

@@ -3,7 +3,7 @@
 //! | engine | bodies | cost per ray | error |
 //! |---|---|---|---|
 //! | [`clip`] | convex | every face plane | γ₈ of the distance, as a shift of the line |
-//! | [`bvh`] | any closed surface | faces near the line | γ₈ of the distance, as a shift of the line |
+//! | [`bvh`] | any closed surface | faces near the line | γ₈ of the distance, as a shift of each vertex |
 
 pub mod bvh;
 pub mod clip;

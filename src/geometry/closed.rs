@@ -13,14 +13,15 @@ use glam::DVec3;
 use super::boxtree::BoxTree;
 use super::fault::{MeshFault, Notice};
 use super::inside::{Side, crossings_ahead, side_of_surface};
+use super::rounding::rounding_tolerance_mm;
 use super::topology::{Components, Edges};
 use super::{Bounds, TriMesh};
 
 /// A closed, 2-manifold, outward-looking surface, and the box hierarchy over its faces.
 ///
 /// Several components are allowed: side by side, or as a cavity (inward-looking, inside another). That the surface
-/// does not cross itself is proved separately, by `self_crossing`, because bodies
-/// made as convex hulls cannot.
+/// does not cross itself and that its components share no volume is proved separately, by `self_crossing` and
+/// `check_components`, because bodies made as convex hulls cannot.
 #[derive(Clone, Debug)]
 pub struct ClosedMesh {
     mesh: TriMesh,
@@ -28,6 +29,7 @@ pub struct ClosedMesh {
     component_count: usize,
     edges: Edges,
     tree: BoxTree,
+    rounding_tolerance_mm: f64,
 }
 
 impl ClosedMesh {
@@ -46,7 +48,10 @@ impl ClosedMesh {
         if mesh.faces.is_empty() {
             return Err(MeshFault::Empty);
         }
-        drop_unused_vertices(&mut mesh, &mut notices);
+        match mesh.drop_unused_vertices() {
+            0 => {}
+            unused => notices.push(Notice::UnusedVertices(unused)),
+        }
 
         let mut edges = Edges::new(&mesh)?;
         let turned = edges.make_winding_consistent(&mut mesh)?;
@@ -55,9 +60,30 @@ impl ClosedMesh {
         }
         let Components { of_face, count } = edges.components(mesh.faces.len());
         let tree = BoxTree::build(&face_boxes(&mesh));
-        let mut closed = Self { mesh, components: of_face, component_count: count, edges, tree };
+        let rounding_tolerance_mm = rounding_tolerance_mm(&mesh.vertices, None);
+        let mut closed =
+            Self { mesh, components: of_face, component_count: count, edges, tree, rounding_tolerance_mm };
         closed.turn_outward(&mut notices)?;
         Ok((closed, notices))
+    }
+
+    /// The same surface, known to have been written on a grid of this spacing, mm: see
+    /// [`written_grid`](super::written_grid). Without, the grid is taken from its coordinates, which shows it no more
+    /// once they were scaled or turned.
+    pub fn with_written_grid_mm(mut self, grid_mm: f64) -> Self {
+        self.rounding_tolerance_mm = rounding_tolerance_mm(&self.mesh.vertices, Some(grid_mm));
+        self
+    }
+
+    /// The same surface, a part of `whole`, whose rounding it shares.
+    pub(super) fn with_rounding_of(mut self, whole: &Self) -> Self {
+        self.rounding_tolerance_mm = whole.rounding_tolerance_mm;
+        self
+    }
+
+    /// How far rounding of its vertices can make a convex surface's vertex stand out of a face's plane, mm.
+    pub fn rounding_tolerance_mm(&self) -> f64 {
+        self.rounding_tolerance_mm
     }
 
     /// The triangles, outward.
@@ -80,15 +106,22 @@ impl ClosedMesh {
         self.component_count
     }
 
+    /// The component of each face, numbered in the order of their first faces.
+    pub(super) fn component_of_face(&self) -> &[u32] {
+        &self.components
+    }
+
     /// One face of each component: the first in the mesh's order.
     pub fn first_faces(&self) -> impl Iterator<Item = usize> + '_ {
         // Components are numbered in the order of their first faces.
         let mut next = 0;
-        self.components.iter().enumerate().filter_map(move |(face, &component)| {
+        let firsts = self.components.iter().enumerate().filter_map(move |(face, &component)| {
             let is_first = component == next;
             next += u32::from(is_first);
             is_first.then_some(face)
-        })
+        });
+        // After the last, the rest of a large mesh need not be looked at.
+        firsts.take(self.component_count)
     }
 
     /// The number of handles of a surface of one component: 0 for a ball, 1 for a torus.
@@ -267,24 +300,6 @@ fn check_numbers(mesh: &TriMesh) -> Result<(), MeshFault> {
 /// Coordinates beyond a thousand million kilometres leave the range in which the exact predicates were checked, and hold no
 /// patient.
 const LARGEST_COORDINATE_MM: f64 = 1e15;
-
-fn drop_unused_vertices(mesh: &mut TriMesh, notices: &mut Vec<Notice>) {
-    const UNUSED: u32 = u32::MAX;
-    let mut new_index = vec![UNUSED; mesh.vertices.len()];
-    let mut kept = Vec::with_capacity(mesh.vertices.len());
-    for vertex in mesh.faces.iter_mut().flatten() {
-        let index = &mut new_index[*vertex as usize];
-        if *index == UNUSED {
-            *index = kept.len() as u32;
-            kept.push(mesh.vertices[*vertex as usize]);
-        }
-        *vertex = *index;
-    }
-    if kept.len() < mesh.vertices.len() {
-        notices.push(Notice::UnusedVertices(mesh.vertices.len() - kept.len()));
-    }
-    mesh.vertices = kept;
-}
 
 fn face_boxes(mesh: &TriMesh) -> Vec<Bounds> {
     mesh.triangles().map(Bounds::of).collect()

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::numeric::{gamma, unit_normal};
+use super::numeric::unit_normal;
 use super::{Bounds, ClosedMesh};
 
 /// A face plane in vertex form: the half-space `normal · (p − point) ≤ 0`.
@@ -79,7 +79,7 @@ impl ConvexMesh {
         }
         // A face without area bounds nothing: its plane is left out, and its neighbours close the body.
         let (planes, plane_of_face) = distinct_planes(&surface);
-        let tolerance_mm = rounding_tolerance_mm(surface.mesh().vertices.iter());
+        let tolerance_mm = surface.rounding_tolerance_mm();
         let (depth_mm, place) = planes.iter().fold((0.0, DVec3::ZERO), |worst, plane| {
             surface.farthest_vertex(plane.normal, plane.point, worst.0).unwrap_or(worst)
         });
@@ -139,46 +139,10 @@ fn distinct_planes(surface: &ClosedMesh) -> (Vec<Plane>, Vec<Option<u32>>) {
     (planes, of_face)
 }
 
-/// How far rounding of its vertices can make a convex surface's vertex stand out of a face's plane, mm.
-///
-/// Two terms: the grid on which the coordinates were written (decimals of a text file, f32 of an STL file) moves
-/// vertex and plane by up to half a grid diagonal each; and f64 arithmetic errs by γ₁₀ of the extent (three
-/// differences, a dot product, a unit normal of three roundings).
-pub fn rounding_tolerance_mm<'a>(vertices: impl Iterator<Item = &'a DVec3> + Clone) -> f64 {
-    let bounds = Bounds::of(vertices.clone().copied());
-    let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
-    let arithmetic = gamma(10) * bounds.diagonal();
-    let grid = written_grid_mm(vertices, largest);
-    let half_diagonal = 0.5 * 3f64.sqrt() * grid;
-    arithmetic + 2.0 * half_diagonal
-}
-
-/// The coarsest grid all coordinates lie on: a decimal one of up to nine places, else the spacing of f32, else of
-/// f64, at the largest coordinate.
-///
-/// Bodies whose coordinates are short decimals by nature (a 10 mm cube) would seem written on a coarse grid, so
-/// no grid coarser than a micrometre, the coarsest that mesh writers use, is assumed.
-fn written_grid_mm<'a>(vertices: impl Iterator<Item = &'a DVec3> + Clone, largest: f64) -> f64 {
-    let coordinates = || vertices.clone().flat_map(|v| v.to_array());
-    let on_decimal_grid = |places: i32| {
-        let scale = 10f64.powi(places);
-        // A decimal is off its nearest f64 by half a unit in the last place, and so is the product.
-        coordinates()
-            .all(|x| ((x * scale).round() - x * scale).abs() <= 4.0 * f64::EPSILON * (x * scale).abs())
-    };
-    let f64_spacing = largest * f64::EPSILON;
-    if let Some(places) = (6..=9).find(|&p| on_decimal_grid(p)) {
-        return 10f64.powi(-places).max(f64_spacing);
-    }
-    if coordinates().all(|x| f64::from(x as f32) == x) {
-        return largest * f64::from(f32::EPSILON);
-    }
-    f64_spacing
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::primitives::{cube, icosphere};
+    use super::super::primitives::{cube, icosphere, prism};
+    use super::super::rounding::written_grid;
     use super::*;
 
     fn convex(mesh: super::super::TriMesh) -> Result<ConvexMesh, NotConvex> {
@@ -212,6 +176,33 @@ mod tests {
         assert!(body.reflex_depth_mm() < 2e-6);
         let as_f32 = icosphere(3).map_vertices(|v| (100.0 * v).as_vec3().as_dvec3());
         assert!(convex(as_f32).is_ok());
+    }
+
+    #[test]
+    fn a_hull_whose_file_was_turned_or_in_metres_stays_convex_on_the_grid_of_its_file() {
+        // Six decimals of a metre: no grid of millimetres explains them, the file's does.
+        // The prism stands askew, or its faces would be on the grid.
+        let askew = glam::DMat3::from_rotation_y(0.5);
+        let in_metres = prism(4).map_vertices(|v| (askew * v * 0.1 * 1e6).round() / 1e6);
+        let as_f32 = prism(4).map_vertices(|v| (askew * v * 100.0).as_vec3().as_dvec3());
+        let turn = glam::DMat3::from_rotation_x(0.3) * glam::DMat3::from_rotation_z(0.7);
+        for (file, scale_mm) in [(in_metres, 1000.0), (as_f32, 1.0)] {
+            let grid_mm = scale_mm * written_grid(&file.vertices);
+            let placed = file.map_vertices(|v| turn * (v * scale_mm));
+            let (surface, _) = ClosedMesh::new(placed).expect("closed");
+            assert!(ConvexMesh::new(surface.clone()).is_err(), "else nothing is shown");
+            let body = ConvexMesh::new(surface.with_written_grid_mm(grid_mm)).expect("convex");
+            assert!(body.reflex_depth_mm() <= 2.0 * grid_mm, "{}", body.reflex_depth_mm());
+        }
+    }
+
+    #[test]
+    fn a_dent_deeper_than_the_files_grid_is_still_found() {
+        let mut dented = icosphere(4).map_vertices(|v| (0.1 * v * 1e6).round() / 1e6);
+        dented.vertices[777] *= 0.99;
+        let grid_mm = 1000.0 * written_grid(&dented.vertices);
+        let (surface, _) = ClosedMesh::new(dented.map_vertices(|v| 1000.0 * v)).expect("closed");
+        assert!(ConvexMesh::new(surface.with_written_grid_mm(grid_mm)).is_err());
     }
 
     #[test]

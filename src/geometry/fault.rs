@@ -61,6 +61,17 @@ pub enum MeshFault {
         /// How many components there are.
         of: usize,
     },
+    /// Two components share some volume, and each has some of its own (or they are equal).
+    CrossingComponents {
+        /// The two components.
+        components: [usize; 2],
+        /// How many components there are.
+        of: usize,
+        /// A place of both, about the deepest found.
+        place: DVec3,
+        /// How deep it lies under the surface of one of them, mm.
+        depth_mm: f64,
+    },
     /// Two faces of the surface pass through each other.
     SelfCrossing {
         /// How many pairs of faces do.
@@ -108,6 +119,12 @@ impl fmt::Display for MeshFault {
                 f,
                 "component {component} of {of} lies inside another and faces the same way, so its volume would count twice"
             ),
+            Self::CrossingComponents { components: [a, b], of, place, depth_mm } => write!(
+                f,
+                "components {a} and {b} of {of} overlap: they share volume near {}, {depth_mm:.3} mm deep, and it would \
+                 count twice",
+                Place(*place)
+            ),
             Self::SelfCrossing { pairs, place } => {
                 let s = if *pairs == 1 { "" } else { "s" };
                 write!(f, "the surface crosses itself: {pairs} pair{s} of faces, one near {}", Place(*place))
@@ -136,6 +153,10 @@ impl MeshFault {
             Self::Flat { .. } => "give the organ a thickness, or take it out of the scene",
             Self::OverlappingComponents { .. } => {
                 "turn the inner component inside out if it is a cavity, or make it an organ of its own"
+            }
+            Self::CrossingComponents { .. } => {
+                "move them apart or face to face, unite them into one surface (\"Boolean union\" in Blender), or make one of \
+                 them an organ of its own"
             }
             Self::SelfCrossing { .. } => {
                 "repair the surface (\"Self Intersecting Faces\" in MeshLab finds them), or rebuild it by remeshing"

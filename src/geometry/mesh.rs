@@ -50,10 +50,41 @@ impl TriMesh {
         self
     }
 
+    /// Drops the vertices of no face and numbers the others in order of first use. Returns how many were dropped.
+    pub fn drop_unused_vertices(&mut self) -> usize {
+        let mut new_index: Vec<Option<u32>> = vec![None; self.vertices.len()];
+        let mut used = Vec::with_capacity(self.vertices.len());
+        for corner in self.faces.as_flattened_mut() {
+            let old = *corner as usize;
+            *corner = *new_index[old].get_or_insert_with(|| {
+                used.push(self.vertices[old]);
+                used.len() as u32 - 1
+            });
+        }
+        let dropped = self.vertices.len() - used.len();
+        self.vertices = used;
+        dropped
+    }
+
     /// The triangles of `other` added to these.
     pub fn append(&mut self, other: &Self) {
         let offset = self.vertices.len() as u32;
         self.vertices.extend_from_slice(&other.vertices);
         self.faces.extend(other.faces.iter().map(|f| f.map(|v| v + offset)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unused_vertices_go_and_the_rest_is_numbered_by_first_use() {
+        let vertices = (0..5).map(|i| DVec3::splat(f64::from(i))).collect();
+        let mut mesh = TriMesh { vertices, faces: vec![[4, 1, 3]] };
+        assert_eq!(mesh.drop_unused_vertices(), 2);
+        assert_eq!(mesh.faces, [[0, 1, 2]]);
+        assert_eq!(mesh.vertices, [4.0, 1.0, 3.0].map(DVec3::splat));
+        assert_eq!(mesh.drop_unused_vertices(), 0);
     }
 }

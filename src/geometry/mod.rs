@@ -3,6 +3,7 @@
 mod bounds;
 mod boxtree;
 mod closed;
+mod components;
 mod convex;
 mod fault;
 mod hull;
@@ -14,12 +15,14 @@ pub mod numeric;
 pub mod predicates;
 pub mod primitives;
 mod relation;
+mod rounding;
 mod topology;
 
 pub use bounds::Bounds;
 pub use boxtree::BoxTree;
 pub use closed::ClosedMesh;
-pub use convex::{ConvexMesh, NotConvex, Plane, rounding_tolerance_mm};
+pub use components::check_components;
+pub use convex::{ConvexMesh, NotConvex, Plane};
 pub use fault::{MeshFault, Notice, Place};
 pub use hull::{HULL_TOLERANCE, HullError, convex_hull};
 pub use inside::Side;
@@ -27,3 +30,4 @@ pub use interval::Interval;
 pub use line::{Line, Segment, UnitDir};
 pub use mesh::TriMesh;
 pub use relation::{Relation, relation, self_crossing};
+pub use rounding::written_grid;

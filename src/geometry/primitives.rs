@@ -31,6 +31,22 @@ pub fn icosphere(subdivisions: u32) -> TriMesh {
     mesh
 }
 
+/// A prism of radius 1 and height 2 about the z axis, `sides` sides: its ends are fans of triangles in one plane.
+pub fn prism(sides: u32) -> TriMesh {
+    let ring = |z: f64| {
+        (0..sides).map(move |i| {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(i) / f64::from(sides)).sin_cos();
+            DVec3::new(cos, sin, z)
+        })
+    };
+    let ends = (1..sides - 1).flat_map(|i| [[0, i + 1, i], [sides, sides + i, sides + i + 1]]);
+    let walls = (0..sides).flat_map(|i| {
+        let j = (i + 1) % sides;
+        [[i, j, j + sides], [i, j + sides, i + sides]]
+    });
+    TriMesh { vertices: ring(-1.0).chain(ring(1.0)).collect(), faces: ends.chain(walls).collect() }
+}
+
 /// The faces of the icosahedron whose vertices `icosphere` lists.
 #[rustfmt::skip]
 const ICOSAHEDRON: [[u32; 3]; 20] = [

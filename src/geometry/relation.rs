@@ -10,7 +10,7 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 
 use super::predicates::{Meeting, meeting};
-use super::{Bounds, ClosedMesh, Side, rounding_tolerance_mm};
+use super::{Bounds, ClosedMesh, Side};
 
 /// How the body `a` lies to the body `b`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,8 +39,7 @@ pub fn relation(a: &ClosedMesh, b: &ClosedMesh) -> Relation {
         return Relation::Disjoint;
     }
     let contact = surface_contact(a, b);
-    let tolerance =
-        rounding_tolerance_mm(a.mesh().vertices.iter()) + rounding_tolerance_mm(b.mesh().vertices.iter());
+    let tolerance = a.rounding_tolerance_mm() + b.rounding_tolerance_mm();
     let a_in_b = Spread::of(&Probes::of(a, contact.surfaces_meet, &contact.on_edges_of_a), b, tolerance);
     let b_in_a = Spread::of(&Probes::of(b, contact.surfaces_meet, &contact.on_edges_of_b), a, tolerance);
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::atomic::write_atomically;
-use crate::Result;
+use crate::{Error, Result};
 
 /// Writes a record as indented JSON with a line end. Returns the number of bytes. JSON knows no NaN and no
 /// infinity: both become `null`.
@@ -17,6 +17,16 @@ pub fn write(path: &Path, record: &impl Serialize) -> Result<u64> {
         serde_json::to_writer_pretty(&mut *out, record)?;
         writeln!(out)
     })
+}
+
+/// A record as indented JSON with a line end, for standard output.
+///
+/// # Errors
+/// If the record has a map whose keys are not text or numbers.
+pub fn text(record: &impl Serialize) -> Result<String> {
+    let text = serde_json::to_string_pretty(record)
+        .map_err(|e| Error::io("write", Path::new("the record as JSON"), e.into()))?;
+    Ok(text + "\n")
 }
 
 #[cfg(test)]
@@ -51,6 +61,7 @@ mod tests {
         let path = folder.path().join("a.json");
         let unheard: std::collections::BTreeMap<Vec<u8>, u8> = [(vec![1], 1)].into();
         assert!(write(&path, &unheard).is_err());
+        assert!(text(&unheard).is_err(), "an empty line would pass for a record");
         assert!(!path.exists());
     }
 }

@@ -129,9 +129,42 @@ fn distinct(names: impl Iterator<Item = String>) -> Vec<String> {
         .collect()
 }
 
-/// `name` with everything but letters, digits, `-` and `_` replaced, so that it is one file name on every system.
+/// The longest name, bytes: file systems take 255, of which pose, product and a temporary file's ending need some 70.
+const MAX_NAME_BYTES: usize = 180;
+
+/// `name` as one file name on every system: everything but letters, digits, `-` and `_` replaced; what Windows keeps for
+/// its devices gets an underscore; what is too long is cut, and ends in a number made from the whole name.
 pub fn safe_name(name: &str) -> String {
-    name.chars().map(|c| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' }).collect()
+    let plain: String =
+        name.chars().map(|c| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' }).collect();
+    if is_device(&plain) || plain.is_empty() {
+        return plain + "_";
+    }
+    if plain.len() <= MAX_NAME_BYTES {
+        return plain;
+    }
+    let suffix = format!("-{:016x}", fnv1a(name));
+    let cut = (0..=MAX_NAME_BYTES - suffix.len()).rev().find(|&i| plain.is_char_boundary(i)).unwrap_or(0);
+    format!("{}{suffix}", &plain[..cut])
+}
+
+/// Whether Windows takes the name for a device, whatever ending follows
+/// (<https://learn.microsoft.com/windows/win32/fileio/naming-a-file>).
+fn is_device(name: &str) -> bool {
+    let name = name.to_lowercase();
+    let is_numbered = |digit: &str| {
+        matches!(digit.chars().next(), Some('0'..='9' | '¹' | '²' | '³')) && digit.chars().count() == 1
+    };
+    matches!(name.as_str(), "con" | "prn" | "aux" | "nul")
+        || ["com", "lpt"].iter().any(|port| name.strip_prefix(port).is_some_and(is_numbered))
+}
+
+/// The 64-bit FNV-1a hash: the same on every system and in every version, as the names of files should be
+/// (Fowler, Noll & Vo).
+fn fnv1a(text: &str) -> u64 {
+    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    })
 }
 
 /// Where the view's pixels are. The slice is as thick as a pixel is wide, for readers that draw volumes.
@@ -264,6 +297,26 @@ mod tests {
             distinct(names.into_iter()),
             ["a_b", "a_b-3", "a_b-4", "A_B-5", "kidney"].map(String::from)
         );
+    }
+
+    #[test]
+    fn long_names_are_cut_to_one_length_and_stay_apart() {
+        let (a, b) = (safe_name(&("ä".repeat(300) + "a")), safe_name(&("ä".repeat(300) + "b")));
+        assert!(a.len() <= MAX_NAME_BYTES && a.len() > MAX_NAME_BYTES - 4, "{}", a.len());
+        assert!(a != b && a[..150] == b[..150]);
+        let longest = "x".repeat(MAX_NAME_BYTES);
+        assert_eq!(safe_name(&longest), longest);
+        // Published with the algorithm: what files are called must never change.
+        assert_eq!(fnv1a("foobar"), 0x8594_4171_f739_67e8);
+    }
+
+    #[test]
+    fn names_of_windows_devices_get_an_underscore() {
+        assert_eq!(
+            ["con", "NUL", "Lpt1", "com³", ""].map(safe_name),
+            ["con_", "NUL_", "Lpt1_", "com³_", "_"]
+        );
+        assert_eq!(["cone", "com", "com10", "aux-1"].map(safe_name), ["cone", "com", "com10", "aux-1"]);
     }
 
     #[test]

@@ -11,7 +11,7 @@ use super::nesting;
 use super::organ::{Organ, Origin};
 use super::schema::{OrganSpec, SceneSpec, SpectrumSpec};
 use super::text::{SceneText, Step};
-use super::{Scene, phantoms};
+use super::{Scene, phantoms, regular_file};
 use crate::error::{Error, Result};
 use crate::physics::composite::parse_colour;
 use crate::physics::{Appearance, Material, Opacity, Spectrum};
@@ -24,8 +24,18 @@ const DEFAULT_COLOUR: &str = "#808080";
 const DEFAULT_OPACITY: f64 = 0.5;
 /// Forty times the densest matter on Earth. Beyond some 1e300, attenuation would overflow.
 const MAX_DENSITY_G_CM3: f64 = 1000.0;
-/// A scene file longer than this is no scene file.
-const MAX_SCENE_BYTES: u64 = 16 << 20;
+/// A scene file longer than 16 MiB is no scene file.
+const SCENE_FILE: regular_file::Kind = regular_file::Kind {
+    name: "scene file",
+    max_bytes: 16 << 20,
+    if_too_large: "give a scene file in TOML; surfaces belong in mesh files beside it",
+};
+/// A megabyte holds some fifty thousand bins: one for each eV that tables resolve.
+const SPECTRUM_FILE: regular_file::Kind = regular_file::Kind {
+    name: "spectrum file",
+    max_bytes: 1 << 20,
+    if_too_large: "give a table of energy_keV,weight with fewer bins",
+};
 /// More organs than any phantom has; their pairs are all compared.
 const MAX_ORGANS: usize = 5_000;
 
@@ -35,16 +45,8 @@ impl Scene {
     /// # Errors
     /// All that is wrong with it, each with its place in the file.
     pub fn load(path: &Path) -> Result<Self> {
-        let size = std::fs::metadata(path).map_err(|e| Error::io("read", path, e))?.len();
+        let text = regular_file::read_text(path, SCENE_FILE)?;
         let name = path.display().to_string();
-        if size > MAX_SCENE_BYTES {
-            return Err(Error::input(
-                name,
-                format!("{size} bytes are too many for a scene"),
-                "give a scene file in TOML",
-            ));
-        }
-        let text = std::fs::read_to_string(path).map_err(|e| Error::io("read", path, e))?;
         Self::build(&SceneText::new(name, text), &Folder::of(path))
     }
 
@@ -92,6 +94,7 @@ impl Scene {
                 organs,
                 beam: spec.beam,
                 spectrum,
+                filters: spec.spectrum.filters,
                 response: spec.spectrum.response,
             }),
             _ => Err(Error::several(errors)),
@@ -163,8 +166,7 @@ fn organ(spec: &OrganSpec, index: usize, text: &SceneText, folder: &Folder) -> R
             Origin::Shapes(shapes.to_vec()),
         ),
         (None, [], Some(mesh)) => {
-            let groups =
-                mesh.groups.clone().or_else(|| mesh.group.clone().map(|g| vec![g])).unwrap_or_default();
+            let groups = mesh.chosen_groups().map_err(|e| at("mesh", e))?.unwrap_or_default();
             let proved = body::of_mesh(mesh, folder).map_err(|e| at("mesh", e))?;
             (proved, Origin::Mesh { file: mesh.file.clone(), groups })
         }
@@ -226,6 +228,5 @@ fn spectrum(spec: &SpectrumSpec, text: &SceneText, folder: &Folder) -> Result<Sp
 
 fn read_spectrum(file: &str, folder: &Folder) -> Result<Spectrum> {
     let path = folder.resolve(file)?;
-    let text = std::fs::read_to_string(&path).map_err(|e| Error::io("read", &path, e))?;
-    Spectrum::from_csv(file, &text)
+    Spectrum::from_csv(file, &regular_file::read_text(&path, SPECTRUM_FILE)?)
 }

@@ -21,12 +21,14 @@ pub mod panel;
 pub mod phantoms;
 mod problem;
 pub mod ranges;
+mod regular_file;
 mod schema;
 pub mod shape;
 mod text;
 mod view;
 
-use crate::physics::{DetectorResponse, Spectrum};
+use crate::error::Result;
+use crate::physics::{DetectorResponse, Filter, Spectrum};
 
 pub use folder::Folder;
 pub use frustum::Frustum;
@@ -51,6 +53,19 @@ pub struct Scene {
     pub beam: beam::BeamSpec,
     /// The photons before the patient, behind all filters.
     pub spectrum: Spectrum,
+    /// The sheets that `spectrum` has passed, for whoever puts another source in its place.
+    pub filters: Vec<Filter>,
     /// What the detector makes of a photon.
     pub response: DetectorResponse,
+}
+
+impl Scene {
+    /// Puts the photons of `source`, as they leave the tube, in place of the scene's; they pass the scene's filters.
+    ///
+    /// # Errors
+    /// If the filters let none of them through.
+    pub fn replace_source(&mut self, source: Spectrum) -> Result<()> {
+        self.spectrum = source.filtered(&self.filters)?;
+        Ok(())
+    }
 }

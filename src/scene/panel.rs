@@ -8,8 +8,14 @@ use super::problem::BeamProblem;
 /// squares and triple products of f64 coordinates could overflow.
 pub const MAX_COORDINATE_MM: f64 = 1e9;
 
-/// The most pixels of one view: the largest array that formats with 32-bit signed sizes can hold.
-pub const MAX_PIXELS: u64 = i32::MAX as u64;
+/// The most pixels of one view: 8192 × 8192, some four times the finest flat panels (430 mm wide, pixels of 0.1 mm).
+/// At [`BYTES_PER_PIXEL`] that is 3 GB; lengths of more organs come on top.
+pub const MAX_PIXELS: u64 = 1 << 26;
+
+/// About what one pixel of a view takes in memory while it is projected and written, bytes: p and T (8), colour as floats
+/// (16), both again while an image is put together (16) and encoded (4), and the length of one organ (4). Each
+/// further organ whose length is asked for takes 4 more where it is seen.
+pub const BYTES_PER_PIXEL: u64 = 48;
 
 /// How far detector rows and columns may be from perpendicular, degrees. Calibrated matrices have a skew of small fractions of a degree;
 /// more means that the numbers are not a camera of square-cut pixels.
@@ -64,11 +70,22 @@ impl Panel {
     /// Refuses panels that are empty, too large, flat, skewed or not finite.
     pub(super) fn check(&self) -> Result<(), BeamProblem> {
         let pixels = u64::from(self.columns) * u64::from(self.rows);
-        if pixels == 0 || pixels > MAX_PIXELS {
+        if pixels == 0 {
             return Err(BeamProblem::new(
                 "detector.pixels",
-                format!("{} × {} pixels are {pixels}", self.columns, self.rows),
-                format!("choose at least one column and one row, and at most {MAX_PIXELS} pixels in all"),
+                format!("{} × {} pixels are no image", self.columns, self.rows),
+                "choose at least one column and one row",
+            ));
+        }
+        if pixels > MAX_PIXELS {
+            let gigabytes = pixels as f64 * BYTES_PER_PIXEL as f64 / 1e9;
+            return Err(BeamProblem::new(
+                "detector.pixels",
+                format!(
+                    "a view of {} × {} pixels would take some {gigabytes:.1} GB of memory",
+                    self.columns, self.rows
+                ),
+                format!("choose at most {MAX_PIXELS} pixels in all, such as 8192 × 8192"),
             ));
         }
         let (column, row) = (self.column_step_mm, self.row_step_mm);

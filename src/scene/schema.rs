@@ -30,6 +30,7 @@ use serde::Deserialize;
 
 use super::beam::BeamSpec;
 use super::shape::Shape;
+use crate::error::{Error, Result};
 use crate::physics::{DetectorResponse, Filter};
 
 /// A whole scene file.
@@ -120,6 +121,21 @@ pub struct MeshSpec {
     /// Moved by this, mm.
     #[serde(default)]
     pub move_mm: [f64; 3],
+}
+
+impl MeshSpec {
+    /// The chosen groups. `None` for all. An error if they are said in both ways.
+    pub fn chosen_groups(&self) -> Result<Option<Vec<String>>> {
+        match (&self.groups, &self.group) {
+            (Some(_), Some(_)) => Err(Error::input(
+                &self.file,
+                "both `group` and `groups` are given",
+                "put all names into `groups` and drop `group`",
+            )),
+            (Some(groups), None) => Ok(Some(groups.clone())),
+            (None, group) => Ok(group.clone().map(|name| vec![name])),
+        }
+    }
 }
 
 /// A unit of length.

@@ -24,10 +24,9 @@ mod tests;
 mod weld;
 
 use std::fmt;
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
+use super::regular_file;
 use crate::geometry::TriMesh;
 use crate::{Error, Result};
 use draft::Draft;
@@ -134,7 +133,12 @@ pub struct MeshFile {
 /// there; if the welding distance is negative or not finite. Each names file, element and remedy. Memory stays
 /// in proportion to the file's real size, whatever its header announces.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<MeshFile> {
-    read_bytes(path, &load(path, options.max_bytes)?, options)
+    let kind = regular_file::Kind {
+        name: "mesh file",
+        max_bytes: options.max_bytes,
+        if_too_large: "reduce the mesh to what the study needs, or raise the limit",
+    };
+    read_bytes(path, &regular_file::read(path, kind)?, options)
 }
 
 /// As [`read`], from the bytes of a file; `path` serves for messages and for the extension.
@@ -160,36 +164,6 @@ pub fn read_bytes(path: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Me
         Format::Ply => ply::read(bytes, &mut draft)?,
     }
     draft.finish(options)
-}
-
-/// A regular file's bytes, at most `max_bytes`.
-fn load(path: &Path, max_bytes: u64) -> Result<Vec<u8>> {
-    let refused = |source| Error::io("read", path, source);
-    // Asked before opening: opening a named pipe would wait for its other end.
-    let about = std::fs::metadata(path).map_err(refused)?;
-    let too_large = || {
-        Error::input(
-            path.display().to_string(),
-            format!("the file is larger than the limit of {max_bytes} bytes"),
-            "reduce the mesh to what the study needs, or raise the limit",
-        )
-    };
-    if !about.is_file() {
-        return Err(Error::input(
-            path.display().to_string(),
-            "this is not a regular file",
-            "give the path of a mesh file",
-        ));
-    }
-    if about.len() > max_bytes {
-        return Err(too_large());
-    }
-    // A file that grows meanwhile is cut at the limit, too.
-    let mut bytes = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(max_bytes.saturating_add(1)).read_to_end(&mut bytes))
-        .map_err(refused)?;
-    if bytes.len() as u64 > max_bytes { Err(too_large()) } else { Ok(bytes) }
 }
 
 /// The lines of a text without their line ends (LF, CR LF or a lone CR), numbered from 1. Bytes that are not

@@ -47,23 +47,10 @@ pub fn weld(mesh: &TriMesh, tolerance: f64) -> Welded {
     let joined = used - kept.positions.len();
     let mut mesh = TriMesh { vertices: kept.positions, faces };
     if collapsed > 0 {
-        drop_unused_vertices(&mut mesh);
+        // Those that only a removed face used.
+        mesh.drop_unused_vertices();
     }
     Welded { mesh, joined, collapsed }
-}
-
-/// Renumbers vertices in order of first use; those that only a removed face used go.
-fn drop_unused_vertices(mesh: &mut TriMesh) {
-    let mut new_index: Vec<Option<u32>> = vec![None; mesh.vertices.len()];
-    let mut vertices = Vec::with_capacity(mesh.vertices.len());
-    for corner in mesh.faces.as_flattened_mut() {
-        let old = *corner as usize;
-        *corner = *new_index[old].get_or_insert_with(|| {
-            vertices.push(mesh.vertices[old]);
-            vertices.len() as u32 - 1
-        });
-    }
-    mesh.vertices = vertices;
 }
 
 /// The vertices kept so far, findable by place.
