@@ -103,10 +103,12 @@ fn remove_stale(record: &Path) -> Result<()> {
 /// The scene of a file, or the phantom of that name.
 pub fn open(scene: &str) -> Result<Scene> {
     let path = Path::new(scene);
-    if !path.exists() && phantoms::find(scene).is_ok() {
+    // A folder of that name, such as one projected into, does not hide the phantom.
+    let is_free = path.is_dir() || !path.exists();
+    if is_free && phantoms::find(scene).is_ok() {
         return Scene::phantom(scene);
     }
-    if !path.exists() && path.extension().is_none() {
+    if is_free && path.extension().is_none() {
         let names: Vec<_> = phantoms::list().iter().map(|p| p.name).collect();
         return Err(Error::input(
             scene,
