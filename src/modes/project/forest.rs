@@ -38,7 +38,7 @@ impl Default for TreeSettings {
 pub struct QueryCounts {
     /// Queries of trees.
     pub queries: u64,
-    /// Answered by interpolation, or by the proof that the cell is empty.
+    /// Answered by interpolation, or by the proof that the cell is empty or that the line passes the box by.
     pub interpolated: u64,
     /// Traced: the cell lies across the body's outline.
     pub traced_silhouette: u64,
