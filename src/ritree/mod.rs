@@ -200,6 +200,12 @@ impl<A: Attribute> RiTree<A> {
         let _ = self.clock.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |t| t.checked_add(1));
     }
 
+    /// As [`tick`](Self::tick), by the clock that trees under one cache share: a tree's own would make those seldom asked
+    /// look old. Time does not run back.
+    pub fn tick_to(&self, time: u32) {
+        self.clock.fetch_max(time, Ordering::Relaxed);
+    }
+
     /// Adds the time stamps of the final leaves, and the bytes that each holds, to `stamps`.
     pub fn collect_stamps(&self, stamps: &mut Vec<(u32, usize)>) {
         self.nodes().for_each(|root| root.collect_stamps(stamps));
