@@ -206,9 +206,13 @@ impl<A: Attribute> RiTree<A> {
         self.clock.fetch_max(time, Ordering::Relaxed);
     }
 
-    /// Adds the time stamps of the final leaves, and the bytes that each holds, to `stamps`.
+    /// Adds to `stamps` the time stamp and the bytes of each final leaf, and of each group of nodes that leads to one: all
+    /// that [`prune`](Self::prune) may keep.
     pub fn collect_stamps(&self, stamps: &mut Vec<(u32, usize)>) {
-        self.nodes().for_each(|root| root.collect_stamps(stamps));
+        for root in self.nodes() {
+            let newest = root.collect_stamps(stamps);
+            stamps.extend(newest.map(|stamp| (stamp, node::bytes::<A::Output>(1))));
+        }
     }
 
     /// Forgets all leaves with time stamps before `oldest_kept`, and all cells only they needed. Answers do not change:

@@ -293,6 +293,7 @@ fn answers_are_the_same_bits_in_any_order_with_any_cache_pruned_or_not() {
                 tree.collect_stamps(&mut stamps);
                 tree.prune(oldest_to_keep(stamps, limit * 3 / 10), &cache);
                 cache.relieved();
+                assert!(cache.used_bytes() <= limit * 3 / 10, "{} of {limit} kept", cache.used_bytes());
             }
         }
         assert_eq!(tree.check_invariants(), cache.used_bytes(), "{limit}");
