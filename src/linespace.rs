@@ -15,6 +15,10 @@ use crate::geometry::{Bounds, Line, UnitDir};
 /// The least and greatest intercept of a line through the box.
 pub const INTERCEPT_RANGE: (f64, f64) = (-1.0, 2.0);
 
+/// How far beyond the range rounding may put a line's intercept, box units. An intercept errs by a few ε of the distance
+/// between the line's origin and the box: less than this up to a million of the box's sides.
+pub const INTERCEPT_MARGIN: f64 = 1e-9;
+
 /// One of the six dominant directions: an axis and a sign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PlanePair {
@@ -132,10 +136,11 @@ impl LineSpace {
     }
 }
 
-/// Whether the intercepts are those of a line that can pass through the box.
+/// Whether the intercepts are those of a line that can pass through the box. Within
+/// [`INTERCEPT_MARGIN`] of the range they are: a line through an edge of the box may be rounded there.
 pub fn is_in_range(stuv: &[f64; 4]) -> bool {
     let (low, high) = INTERCEPT_RANGE;
-    stuv.iter().all(|&x| low <= x && x <= high)
+    stuv.iter().all(|&x| low - INTERCEPT_MARGIN <= x && x <= high + INTERCEPT_MARGIN)
 }
 
 /// A box of line space: for each of s, t, u, v its least and greatest value.
@@ -231,14 +236,29 @@ mod tests {
             let through = space.min() + space.size() * DVec3::from(p);
             let line = Line::new(through - 700.0 * dir.get(), dir).expect("finite");
             let point = space.point_of(&line);
-            let rounded = point.stuv.map(|x| x.clamp(-1.0 - 1e-9, 2.0 + 1e-9));
-            prop_assert_eq!(point.stuv, rounded);
+            prop_assert!(is_in_range(&point.stuv), "{:?}", point);
             let back = space.line_of(point).expect("a line");
             prop_assert!(back.dir().dot(line.dir()) > 1.0 - 1e-12);
             prop_assert!((through - back.origin()).cross(back.dir()).length() < 1e-9);
             let reversed = space.point_of(&line.reversed());
             prop_assert_eq!(reversed.pair, point.reversed().pair);
         }
+    }
+
+    #[test]
+    fn a_line_through_an_edge_of_the_box_is_in_range_however_it_is_rounded() {
+        // At slope 1 through the edge at the box's far end: s is −1 or 2, but for rounding.
+        let (space, mut outside) = (space(), 0);
+        for i in 0..2_000_u32 {
+            let (y, dy) = if i % 2 == 0 { (0.0, 1.0) } else { (1.0, -1.0) };
+            let dir =
+                UnitDir::new(space.size() * DVec3::new(1.0, dy, f64::from(i) / 2e3)).expect("a direction");
+            let at_edge = space.min() + space.size() * DVec3::new(1.0, y, 0.01);
+            let point = space.point_of(&Line::new(at_edge - 700.0 * dir.get(), dir).expect("finite"));
+            outside += u32::from(point.stuv.iter().any(|x| !(-1.0..=2.0).contains(x)));
+            assert!(is_in_range(&point.stuv), "{point:?}");
+        }
+        assert!(outside > 0, "no line was rounded out of range");
     }
 
     #[test]

@@ -52,7 +52,7 @@ impl Cache {
     }
 }
 
-/// The oldest stamp to keep so that the leaves from it on hold no more than `bytes`: least recently used go first.
+/// The oldest stamp to keep so that what is stamped from it on holds no more than `bytes`: least recently used go first.
 pub fn oldest_to_keep(mut stamps: Vec<(u32, usize)>, bytes: usize) -> u32 {
     stamps.sort_unstable_by_key(|&(stamp, _)| std::cmp::Reverse(stamp));
     let mut kept = 0;

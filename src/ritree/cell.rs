@@ -12,6 +12,10 @@ pub type Corners<T> = [T; 16];
 /// The fewest samples that define a linear interpolant in 4-space (§2.5).
 const LINEAR_SAMPLES: usize = 5;
 
+/// Where cells are final whatever the parameters say: 3/2³⁰ wide, still many times the rounding of an intercept. Much
+/// deeper, halving a cell would give the cell again, without end.
+const DEEPEST: u32 = 120;
+
 /// What is to be done with a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
@@ -115,7 +119,7 @@ impl Place {
         corners: &Corners<A::Output>,
         parameters: &Parameters,
     ) -> Verdict {
-        let is_deepest = self.depth >= parameters.max_depth;
+        let is_deepest = self.depth >= parameters.max_depth.min(DEEPEST);
         let class = attribute.class(&corners[0]);
         let other = corners.iter().map(|c| attribute.class(c)).find(|&c| c != class);
         if let Some(other) = other {

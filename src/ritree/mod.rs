@@ -44,7 +44,8 @@ pub struct Parameters {
     pub distance_threshold: f64,
     /// Directions farther apart than this are not interpolated, degrees.
     pub angular_threshold_deg: f64,
-    /// The depth at which cells are final whatever their middle says.
+    /// The depth at which cells are final whatever their middle says. More than 120 is as 120: cells are then as small
+    /// as f64 can tell apart.
     pub max_depth: u32,
 }
 
@@ -95,6 +96,10 @@ impl<A: Attribute> RiTree<A> {
     pub fn query(&self, line: LinePoint, cache: &Cache) -> Option<Answer<A::Output>> {
         let line =
             if self.attribute.is_symmetric() && line.pair.is_reversed() { line.reversed() } else { line };
+        if !line.stuv.iter().all(|x| x.is_finite()) {
+            // Overflow on the way to box units says nothing about the line.
+            return Some(Answer::Trace(Reason::Guard));
+        }
         if !is_in_range(&line.stuv) {
             return None;
         }
@@ -191,13 +196,23 @@ impl<A: Attribute> RiTree<A> {
 
     /// Lets time pass for the least-recently-used rule; call it now and then, such as once per tile of rays.
     pub fn tick(&self) {
-        // At the end of time, stamps stay at the last one: pruning then forgets by position, answers do not change.
+        // At the end of time, stamps stay at the last one and pruning keeps all of them; answers do not change.
         let _ = self.clock.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |t| t.checked_add(1));
     }
 
-    /// Adds the time stamps of the final leaves, and the bytes that each holds, to `stamps`.
+    /// As [`tick`](Self::tick), by the clock that trees under one cache share: a tree's own would make those seldom asked
+    /// look old. Time does not run back.
+    pub fn tick_to(&self, time: u32) {
+        self.clock.fetch_max(time, Ordering::Relaxed);
+    }
+
+    /// Adds to `stamps` the time stamp and the bytes of each final leaf, and of each group of nodes that leads to one: all
+    /// that [`prune`](Self::prune) may keep.
     pub fn collect_stamps(&self, stamps: &mut Vec<(u32, usize)>) {
-        self.nodes().for_each(|root| root.collect_stamps(stamps));
+        for root in self.nodes() {
+            let newest = root.collect_stamps(stamps);
+            stamps.extend(newest.map(|stamp| (stamp, node::bytes::<A::Output>(1))));
+        }
     }
 
     /// Forgets all leaves with time stamps before `oldest_kept`, and all cells only they needed. Answers do not change:

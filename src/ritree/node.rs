@@ -112,11 +112,16 @@ impl<T: Clone + Send + Sync> Node<T> {
         Ok(())
     }
 
-    pub fn collect_stamps(&self, stamps: &mut Vec<(u32, usize)>) {
+    /// See [`RiTree::collect_stamps`]; returns the newest stamp. A pair of halves lives as long as the newest leaf below.
+    pub fn collect_stamps(&self, stamps: &mut Vec<(u32, usize)>) -> Option<u32> {
         if let Some(leaf) = self.leaf() {
-            stamps.push((leaf.stamp.load(Ordering::Relaxed), size_of::<Leaf<T>>()));
+            let stamp = leaf.stamp.load(Ordering::Relaxed);
+            stamps.push((stamp, size_of::<Leaf<T>>()));
+            return Some(stamp);
         }
-        self.halves().into_iter().flatten().for_each(|half| half.collect_stamps(stamps));
+        let newest = self.halves()?.iter().filter_map(|half| half.collect_stamps(stamps)).max();
+        stamps.extend(newest.map(|stamp| (stamp, bytes::<T>(2))));
+        newest
     }
 
     /// Forgets old leaves and corners that wait; whether anything is left.

@@ -233,6 +233,36 @@ fn lines_out_of_range_are_not_the_trees() {
     assert_eq!(tree.query(beside, &roomy()), None);
 }
 
+#[test]
+fn lines_on_the_rim_of_the_range_but_for_rounding_are_the_trees() {
+    let tree = RiTree::new(Test::smooth(|[s, ..]| s), Parameters::default());
+    for (s, rounded) in [(2.0, 2.0_f64.next_up()), (-1.0, (-1.0_f64).next_down())] {
+        let point = LinePoint { pair: PlanePair::ALL[0], stuv: [rounded, 0.5, 0.5, 0.5] };
+        assert!((interpolated(tree.query(point, &roomy())) - s).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn a_line_whose_intercepts_overflow_is_traced_not_missed() {
+    let tree = RiTree::new(Test::smooth(|_| 1.0), Parameters::default());
+    for bad in [f64::NAN, f64::INFINITY] {
+        let point = LinePoint { pair: PlanePair::ALL[0], stuv: [0.5, bad, 0.5, 0.5] };
+        assert_eq!(tree.query(point, &roomy()), Some(Answer::Trace(Reason::Guard)));
+    }
+}
+
+#[test]
+fn splitting_ends_where_f64_does() {
+    let rim = LinePoint { pair: PlanePair::ALL[0], stuv: [0.7, 0.5, 0.3, 0.2] };
+    for cache in [roomy(), Cache::new(0)] {
+        let tree = RiTree::new(step(false), settings(f64::NAN, u32::MAX));
+        assert_eq!(tree.query(rim, &cache), Some(Answer::Trace(Reason::Silhouette)));
+        let smooth = LinePoint { stuv: [0.1; 4], ..rim };
+        assert!((interpolated(tree.query(smooth, &cache)) - 0.2).abs() < 1e-9);
+        tree.check_invariants();
+    }
+}
+
 fn bits(answer: Option<Answer<Sample>>) -> Option<Result<u64, Reason>> {
     answer.map(|a| match a {
         Answer::Interpolated(sample) => Ok(sample.value.to_bits()),
@@ -263,6 +293,7 @@ fn answers_are_the_same_bits_in_any_order_with_any_cache_pruned_or_not() {
                 tree.collect_stamps(&mut stamps);
                 tree.prune(oldest_to_keep(stamps, limit * 3 / 10), &cache);
                 cache.relieved();
+                assert!(cache.used_bytes() <= limit * 3 / 10, "{} of {limit} kept", cache.used_bytes());
             }
         }
         assert_eq!(tree.check_invariants(), cache.used_bytes(), "{limit}");

@@ -1,5 +1,6 @@
 //! The RI-trees of a run: one per organ, made when the first ray reaches it, under one cache.
 
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{OnceLock, PoisonError, RwLock, RwLockReadGuard};
 
 use serde::Serialize;
@@ -38,7 +39,7 @@ impl Default for TreeSettings {
 pub struct QueryCounts {
     /// Queries of trees.
     pub queries: u64,
-    /// Answered by interpolation, or by the proof that the cell is empty.
+    /// Answered by interpolation, or by the proof that the cell is empty or that the line passes the box by.
     pub interpolated: u64,
     /// Traced: the cell lies across the body's outline.
     pub traced_silhouette: u64,
@@ -101,23 +102,29 @@ pub struct Forest<'a> {
     bodies: Vec<&'a Body>,
     settings: TreeSettings,
     cache: Cache,
+    /// Tiles so far: the time of all trees.
+    clock: AtomicU32,
 }
 
 /// Many trees to ask, none of them pruned meanwhile.
 pub struct Grove<'f, 'a> {
     trees: RwLockReadGuard<'f, Vec<OnceLock<RiTree<ChordLength<'a>>>>>,
     forest: &'f Forest<'a>,
+    now: u32,
 }
 
 impl<'a> Forest<'a> {
     pub fn new(bodies: Vec<&'a Body>, settings: TreeSettings) -> Self {
         let trees = RwLock::new(bodies.iter().map(|_| OnceLock::new()).collect());
-        Self { trees, bodies, settings, cache: Cache::new(settings.cache_bytes) }
+        let cache = Cache::new(settings.cache_bytes);
+        Self { trees, bodies, settings, cache, clock: AtomicU32::new(1) }
     }
 
     /// The trees, to be asked by one thread for the rays of one tile: the only lock, and not per ray.
     pub fn enter(&self) -> Grove<'_, 'a> {
-        Grove { trees: self.trees.read().unwrap_or_else(PoisonError::into_inner), forest: self }
+        // Wrapping, after four thousand million tiles, would cost pruning its judgement for a while, never an answer.
+        let now = self.clock.fetch_add(1, Ordering::Relaxed);
+        Grove { trees: self.trees.read().unwrap_or_else(PoisonError::into_inner), forest: self, now }
     }
 
     /// Forgets the least recently used leaves if the cache was full.
@@ -175,7 +182,7 @@ impl<'a> Grove<'_, 'a> {
         }
         let attribute = ChordLength::new(body)?;
         let tree = self.trees[organ].get_or_init(|| RiTree::new(attribute, self.forest.settings.parameters));
-        tree.tick();
+        tree.tick_to(self.now);
         Some(tree)
     }
 
@@ -198,4 +205,32 @@ pub fn holds_box(segment: &Segment, bounds: &crate::geometry::Bounds) -> bool {
     let (o, d) = (segment.line().origin(), segment.line().dir());
     let (middle, half) = ((bounds.centre() - o).dot(d), 0.5 * bounds.size().dot(d.abs()));
     middle - half >= 0.0 && middle + half <= segment.length_mm()
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::geometry::primitives::icosphere;
+    use crate::geometry::{ClosedMesh, Line, UnitDir};
+
+    #[test]
+    fn trees_share_one_clock_so_that_the_one_asked_last_is_the_newest() {
+        let ball = || Body::new(ClosedMesh::new(icosphere(2)).expect("closed").0);
+        let (often, once) = (ball(), ball());
+        let forest = Forest::new(vec![&often, &once], TreeSettings::default());
+        let line = Line::new(DVec3::ZERO, UnitDir::new(DVec3::new(1.0, 0.2, 0.1)).expect("a direction"));
+        let line = line.expect("finite");
+        let newest = |organ: usize| {
+            let grove = forest.enter();
+            let tree = grove.tree(organ).expect("a tree");
+            let _ = tree.query(tree.attribute().space().point_of(&line), &forest.cache);
+            let mut stamps = Vec::new();
+            tree.collect_stamps(&mut stamps);
+            stamps.iter().map(|s| s.0).max().expect("leaves")
+        };
+        let old = (0..50).map(|_| newest(0)).max().expect("asked");
+        assert!(newest(1) > old);
+    }
 }

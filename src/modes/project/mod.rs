@@ -201,15 +201,15 @@ struct Tile {
     queries: QueryCounts,
 }
 
-/// How a pixel's lengths were found.
+/// How a pixel's lengths were found, of those organs that have a tree.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Found {
-    /// No organ is met, or none was asked.
+    /// No organ with a tree is met, or none was asked.
     #[default]
     Nothing,
     /// All by interpolation.
     Interpolated,
-    /// At least one organ's by tracing.
+    /// At least one organ's by tracing, be it only to find that it is missed.
     Traced,
 }
 

@@ -29,9 +29,9 @@ pub struct SampledError {
 }
 
 impl Projector<'_> {
-    /// Compares `rays` random pixels' rays of the views, all organs each. `None` without trees.
+    /// Compares `rays` random pixels' rays of the views, all organs each. `None` without trees or without views.
     pub fn spot_check(&self, views: &[View], rays: usize, seed: u64) -> Option<SampledError> {
-        let grove = self.forest.as_ref()?.enter();
+        let grove = self.forest.as_ref().filter(|_| !views.is_empty())?.enter();
         let mut rng = Pcg64::seed_from_u64(seed);
         let mut below = |n: u64| rng.next_u64() % n.max(1);
         let (mut errors, mut total) = (Vec::new(), 0.0);
