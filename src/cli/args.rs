@@ -112,7 +112,7 @@ pub struct MethodArgs {
         allow_negative_numbers = true
     )]
     pub angular_threshold_deg: f64,
-    /// RI-tree: cells of this depth are final.
+    /// RI-tree: cells of this depth are final, whatever their middle says: a low depth gives an error without bound.
     #[arg(long, value_name = "N", default_value_t = 28, value_parser = clap::value_parser!(u32).range(0..=60))]
     pub max_depth: u32,
     /// RI-tree: the most that nodes and samples of all trees may hold, megabytes.
@@ -124,7 +124,8 @@ pub struct MethodArgs {
     /// RI-tree: bodies with fewer face planes are clipped instead.
     #[arg(long, value_name = "N", default_value_t = 48)]
     pub tree_planes: usize,
-    /// RI-tree: also write the map of traced pixels: white where any organ was traced, grey where all were interpolated.
+    /// RI-tree: also write the map of traced pixels: white where any organ with a tree was traced, grey where all were
+    /// interpolated.
     #[arg(long)]
     pub map: bool,
 }

@@ -46,10 +46,17 @@ impl Projector<'_> {
                     continue;
                 };
                 let Ok(chord) = grove.chord(tree, &ray) else { continue };
-                // The whole box lies between the ray's ends, so its line's chord is its own.
-                body.chords_of_lone_line(ray.line(), &mut parts);
-                let exact: f64 = parts.iter().map(Interval::length).sum();
                 let near = chord.map_or(0.0, |c| c.length());
+                let mut length_by = |find: &dyn Fn(&mut Vec<Interval>)| -> f64 {
+                    find(&mut parts);
+                    parts.iter().map(Interval::length).sum()
+                };
+                // The hierarchy finds the rays that are worth comparing; clipping, which takes no part in sampling large
+                // bodies, is the judge of them.
+                if near == 0.0 && length_by(&|parts| body.chords_of_lone_line(ray.line(), parts)) == 0.0 {
+                    continue;
+                }
+                let exact = length_by(&|parts| body.chords_of_segment(&ray, parts));
                 if exact > 0.0 || near > 0.0 {
                     errors.push((near - exact).abs());
                     total += exact;
