@@ -26,6 +26,12 @@ fn err(output: &Output) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
+/// The run's summary, printed by `--json` and nothing else.
+fn summary(run: &Output) -> serde_json::Value {
+    assert_eq!(run.status.code(), Some(0), "{}", err(run));
+    serde_json::from_slice(&run.stdout).expect("only JSON")
+}
+
 /// A folder with the scene `balls.toml`, 64 × 64 pixels.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
@@ -117,7 +123,7 @@ fn json_goes_to_standard_output_and_nothing_else_does() {
     let folder = folder();
     let run =
         chordfield(folder.path(), &["project", "balls.toml", "--json", "--write", "p", "--threads", "1"]);
-    let summary: serde_json::Value = serde_json::from_slice(&run.stdout).expect("only JSON");
+    let summary = summary(&run);
     assert_eq!((&summary["method"], &summary["threads"]), (&"exact".into(), &1.into()));
     let count = |key: &str| summary[key].as_u64().unwrap_or_else(|| panic!("no {key}"));
     assert_eq!(
@@ -378,7 +384,7 @@ fn ritrees_report_what_they_did_and_draw_their_map() {
         "p",
     ];
     let run = chordfield(folder.path(), &args);
-    let summary: serde_json::Value = serde_json::from_slice(&run.stdout).expect("only JSON");
+    let summary = summary(&run);
     assert_eq!(summary["method"], "ritree");
     let trees = &summary["ritree"];
     assert_eq!(trees["settings"]["parameters"]["max_depth"], 16);
@@ -428,7 +434,7 @@ fn peak_memory_stays_under_cache_plus_images_plus_meshes_plus_slack() {
     ];
     let run = chordfield(folder.path(), &args);
     assert_eq!(run.status.code(), Some(0), "{}", err(&run));
-    let summary: serde_json::Value = serde_json::from_slice(&run.stdout).expect("only JSON");
+    let summary = summary(&run);
     let peak = summary["peak_bytes"].as_f64().expect("Linux tells");
     // p and T of a view by tiles and once more as an image; a thousand faces of some 500 bytes.
     let (images, meshes) = (3.0 * 512.0 * 512.0 * 4.0, 1000.0 * 500.0);

@@ -207,7 +207,7 @@ mod tests {
 
     use super::super::clip::ConvexClipper;
     use super::*;
-    use crate::geometry::primitives::{cube, icosphere};
+    use crate::geometry::primitives::{cube, icosphere, inside_out};
     use crate::geometry::{ConvexMesh, TriMesh, UnitDir};
 
     fn closed(mesh: TriMesh) -> ClosedMesh {
@@ -237,9 +237,7 @@ mod tests {
     #[test]
     fn a_hollow_ball_counts_its_wall_only() {
         let mut shell = cube(6.0);
-        let mut hole = cube(2.0);
-        hole.faces.iter_mut().for_each(|f| f.swap(0, 1));
-        shell.append(&hole);
+        shell.append(&inside_out(cube(2.0)));
         assert_eq!(total(&closed(shell), &line(DVec3::new(0.1, 0.2, -9.0), DVec3::Z)), 4.0);
     }
 

@@ -307,18 +307,8 @@ fn face_boxes(mesh: &TriMesh) -> Vec<Bounds> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::primitives::{cube, icosphere};
+    use super::super::primitives::{block, cube, icosphere, inside_out};
     use super::*;
-
-    fn block(low: [f64; 3], high: [f64; 3]) -> TriMesh {
-        let (low, high) = (DVec3::from(low), DVec3::from(high));
-        cube(1.0).map_vertices(|v| low + (v + 0.5) * (high - low))
-    }
-
-    fn inside_out(mut mesh: TriMesh) -> TriMesh {
-        mesh.faces.iter_mut().for_each(|f| f.swap(0, 1));
-        mesh
-    }
 
     #[test]
     fn a_cube_is_closed_and_holds_its_volume() {

@@ -15,6 +15,18 @@ pub fn cube(side_mm: f64) -> TriMesh {
     TriMesh { vertices, faces }
 }
 
+/// A box between two corners, 12 faces.
+pub fn block(low: [f64; 3], high: [f64; 3]) -> TriMesh {
+    let (low, high) = (DVec3::from(low), DVec3::from(high));
+    cube(1.0).map_vertices(|v| low + (v + 0.5) * (high - low))
+}
+
+/// The same surface with every face turned over: a cavity's from a solid's.
+pub fn inside_out(mut mesh: TriMesh) -> TriMesh {
+    mesh.faces.iter_mut().for_each(|f| f.swap(0, 1));
+    mesh
+}
+
 /// A unit sphere about the origin: an icosahedron whose faces are split in four `subdivisions` times,
 /// 20 · 4ⁿ faces with all vertices on the sphere.
 pub fn icosphere(subdivisions: u32) -> TriMesh {

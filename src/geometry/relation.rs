@@ -216,7 +216,7 @@ impl Spread {
 #[cfg(test)]
 mod tests {
     use super::super::TriMesh;
-    use super::super::primitives::{cube, icosphere};
+    use super::super::primitives::{cube, icosphere, inside_out};
     use super::*;
 
     fn closed(mesh: TriMesh) -> ClosedMesh {
@@ -275,8 +275,7 @@ mod tests {
     #[test]
     fn a_ball_in_a_cavity_is_disjoint_from_the_shell() {
         let mut shell = icosphere(2).map_vertices(|v| 10.0 * v);
-        let mut hole = icosphere(2).map_vertices(|v| 8.0 * v);
-        hole.faces.iter_mut().for_each(|f| f.swap(0, 1));
+        let hole = inside_out(icosphere(2).map_vertices(|v| 8.0 * v));
         shell.append(&hole);
         let ball = closed(icosphere(2).map_vertices(|v| 5.0 * v));
         assert_eq!(relation(&closed(shell), &ball), Relation::Disjoint);
@@ -285,8 +284,7 @@ mod tests {
     #[test]
     fn a_ball_that_fills_a_cavity_and_half_its_wall_crosses_the_shell() {
         let mut skull = icosphere(2).map_vertices(|v| 10.0 * v);
-        let mut hole = icosphere(2).map_vertices(|v| 8.0 * v);
-        hole.faces.iter_mut().for_each(|f| f.swap(0, 1));
+        let hole = inside_out(icosphere(2).map_vertices(|v| 8.0 * v));
         skull.append(&hole);
         let (skull, brain) = (closed(skull), closed(icosphere(2).map_vertices(|v| 9.0 * v)));
         assert!(is_crossing(relation(&skull, &brain)));
@@ -321,7 +319,7 @@ mod tests {
                 DVec3::new(6.0 * v.x, v.y + 0.5, z + 0.5)
             });
             if mirrored {
-                bar.faces.iter_mut().for_each(|f| f.swap(0, 1));
+                bar = inside_out(bar);
             }
             assert!(is_crossing(relation(&notched, &closed(bar))), "{mirrored}");
         }
