@@ -186,6 +186,11 @@ impl Region {
     fn pixels(&self) -> usize {
         self.columns.len() * self.rows.len()
     }
+
+    /// Column and row of each pixel, row by row: the order of all lists of a tile.
+    fn places(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
+        self.rows.clone().flat_map(|row| self.columns.clone().map(move |column| (column, row)))
+    }
 }
 
 /// The values of one tile, row by row; an empty list stands for "nothing there" in every pixel.

@@ -59,12 +59,7 @@ impl<'a, 's> TileTracer<'a, 's> {
     pub fn trace(&self, region: Region) -> Tile {
         let frustum = self.view.frustum(region.columns.clone(), region.rows.clone());
         let touched = self.touched(&frustum);
-        let rays: Vec<Segment> = region
-            .rows
-            .clone()
-            .flat_map(|r| region.columns.clone().map(move |c| (c, r)))
-            .map(|(c, r)| self.view.segment(c, r))
-            .collect();
+        let rays: Vec<Segment> = region.places().map(|(c, r)| self.view.segment(c, r)).collect();
 
         let wanted = self.projector.wanted;
         let mut per_ray: Vec<Vec<(usize, Interval)>> =
@@ -123,7 +118,8 @@ impl<'a, 's> TileTracer<'a, 's> {
         let body = &self.projector.scene.organs[organ].body;
         let tree = grove.and_then(|grove| grove.tree(organ).map(|tree| (grove, tree)));
         let bounds = body.bounds();
-        let mut body = body.narrowed(|bounds| !frustum.misses(bounds));
+        // Where a tree answers the whole tile, nothing is narrowed.
+        let mut narrowed = None;
         let mut parts = Vec::new();
         let mut lengths = Vec::with_capacity(rays.len());
         for (i, ray) in rays.iter().enumerate() {
@@ -145,7 +141,8 @@ impl<'a, 's> TileTracer<'a, 's> {
                     Found::Interpolated
                 }
                 None => {
-                    body.chords_of_segment(ray, &mut parts);
+                    let narrow = || body.narrowed(|bounds| !frustum.misses(bounds));
+                    narrowed.get_or_insert_with(narrow).chords_of_segment(ray, &mut parts);
                     Found::Traced
                 }
             };
@@ -195,8 +192,7 @@ impl<'a, 's> TileTracer<'a, 's> {
         let mut transmission: Vec<f64> = p.iter().map(|p| (-p).exp()).collect();
         if let Some(noise) = noise {
             let (columns, _) = self.view.size();
-            let pixels = region.rows.clone().flat_map(|r| region.columns.clone().map(move |c| (c, r)));
-            for (ray, (column, row)) in pixels.enumerate() {
+            for (ray, (column, row)) in region.places().enumerate() {
                 let pixel = u64::from(row) * u64::from(columns) + u64::from(column);
                 transmission[ray] = noise.transmission(attenuator, &masses, ray, self.view_index, pixel);
                 p[ray] = noise.line_integral(transmission[ray]);
