@@ -181,11 +181,6 @@ impl Cell {
         [lower, upper]
     }
 
-    /// Whether the point is in the cell, its surface included.
-    pub fn contains(&self, stuv: &[f64; 4]) -> bool {
-        (0..4).all(|a| self.low[a] <= stuv[a] && stuv[a] <= self.high[a])
-    }
-
     /// Where the point lies between low (0) and high (1) on each axis.
     pub fn fractions(&self, stuv: &[f64; 4]) -> [f64; 4] {
         std::array::from_fn(|a| (stuv[a] - self.low[a]) / (self.high[a] - self.low[a]))

@@ -8,8 +8,6 @@
 pub mod bvh;
 pub mod clip;
 
-use glam::DVec3;
-
 use crate::geometry::{Bounds, ClosedMesh, ConvexMesh, Interval, Line, NotConvex, Segment};
 use clip::{ConvexClipper, NarrowedClipper};
 
@@ -68,11 +66,6 @@ impl Body {
     /// The box around it, mm.
     pub fn bounds(&self) -> Bounds {
         self.surface().bounds()
-    }
-
-    /// Whether `point` lies in the body or on its surface. Exact.
-    pub fn contains(&self, point: DVec3) -> bool {
-        self.surface().side_of(point) != crate::geometry::Side::Outside
     }
 
     /// The parts of `line` in the body, mm along `dir`, in order and disjoint; written to `parts`.
