@@ -7,6 +7,9 @@
 
 pub mod bvh;
 pub mod clip;
+mod record;
+
+pub use record::{Lengths, Pierce, Pierced, Record, Spans, Way};
 
 use crate::geometry::{Bounds, ClosedMesh, ConvexMesh, Interval, Line, NotConvex, Segment};
 use clip::{ConvexClipper, NarrowedClipper};

@@ -22,7 +22,7 @@ use super::frustum::Frustum;
 use super::iec::{IecAngles, sin_cos_deg};
 use super::panel::{MAX_COORDINATE_MM, Panel, check_coordinates, largest_coordinate};
 use super::problem::BeamProblem;
-use crate::geometry::{Segment, UnitDir};
+use crate::geometry::{RayGrid, Segment, UnitDir, Upstream};
 
 /// The least distance of the source from the detector's plane over the largest coordinate. Below it rounding (1e-16 per operation)
 /// would decide on which side the source lies.
@@ -59,6 +59,7 @@ pub struct View {
     source_mm: DVec3,
     projection: Projection,
     panel: Panel,
+    rays: RayGrid,
     pose: Pose,
 }
 
@@ -85,7 +86,7 @@ impl View {
                 "move the source away from the plane of the detector",
             ));
         }
-        Ok(Self::settled(source_mm, Projection::Cone, panel, pose))
+        Self::settled(source_mm, Projection::Cone, panel, pose)
     }
 
     /// The view of parallel rays along `downstream`. Each ray starts `sdd_mm` upstream of its pixel, so the plane of starts is
@@ -110,37 +111,49 @@ impl View {
                 "let the rays cross the detector, from a distance in millimetres",
             ));
         }
-        Ok(Self::settled(source_mm, Projection::Parallel { downstream, sdd_mm }, panel, pose))
+        Self::settled(source_mm, Projection::Parallel { downstream, sdd_mm }, panel, pose)
     }
 
     /// Adding zero turns −0, which quarter turns produce, into 0, so that reports read well.
-    fn settled(source_mm: DVec3, projection: Projection, mut panel: Panel, pose: Pose) -> Self {
+    fn settled(
+        source_mm: DVec3,
+        projection: Projection,
+        mut panel: Panel,
+        pose: Pose,
+    ) -> Result<Self, BeamProblem> {
         for vector in [&mut panel.origin_mm, &mut panel.column_step_mm, &mut panel.row_step_mm] {
             *vector += DVec3::ZERO;
         }
-        Self { source_mm: source_mm + DVec3::ZERO, projection, panel, pose }
+        let source_mm = source_mm + DVec3::ZERO;
+        let upstream = match projection {
+            Projection::Cone => Upstream::Source(source_mm),
+            Projection::Parallel { downstream, sdd_mm } => Upstream::Path(sdd_mm * downstream.get()),
+        };
+        let steps = [panel.column_step_mm, panel.row_step_mm];
+        let rays = RayGrid::new(upstream, panel.origin_mm, steps, [panel.columns, panel.rows]);
+        let rays = rays.ok_or_else(|| {
+            BeamProblem::new(
+                "detector.size_mm",
+                "the detector is so small or so far away that its rays cannot be told apart",
+                "give the detector and its distance in millimetres",
+            )
+        })?;
+        Ok(Self { source_mm, projection, panel, rays, pose })
+    }
+
+    /// The rays of the image, one per pixel.
+    pub fn rays(&self) -> &RayGrid {
+        &self.rays
     }
 
     /// The path from the source to the centre of a pixel. Pixels off the panel have one as well, while finite.
     pub fn segment(&self, column: u32, row: u32) -> Segment {
-        let target = self.pixel_centre(column, row);
-        Segment::between(self.upstream_of(target), target)
-            .expect("the constructors keep every pixel finite and off its source")
+        self.rays.segment(column, row)
     }
 
     /// The centre of a pixel, mm.
     pub fn pixel_centre(&self, column: u32, row: u32) -> DVec3 {
-        self.panel.origin_mm
-            + f64::from(column) * self.panel.column_step_mm
-            + f64::from(row) * self.panel.row_step_mm
-    }
-
-    /// Where the ray to `target` starts.
-    fn upstream_of(&self, target: DVec3) -> DVec3 {
-        match self.projection {
-            Projection::Cone => self.source_mm,
-            Projection::Parallel { downstream, sdd_mm } => target - sdd_mm * downstream.get(),
-        }
+        self.rays.point(column, row)
     }
 
     /// Columns and rows of the image.
@@ -234,8 +247,8 @@ impl View {
     pub fn frustum(&self, columns: Range<u32>, rows: Range<u32>) -> Frustum {
         let last = |range: &Range<u32>| range.end.saturating_sub(1).max(range.start);
         let ray_to = |column, row| {
-            let target = self.pixel_centre(column, row);
-            (self.upstream_of(target), target)
+            let target = self.rays.point(column, row);
+            (self.rays.start_of(target), target)
         };
         let corners = [
             ray_to(columns.start, rows.start),

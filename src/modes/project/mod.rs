@@ -15,13 +15,14 @@ mod spot_check;
 mod sweep;
 mod tile;
 
-use std::ops::{AddAssign, Range};
+use std::ops::AddAssign;
 
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::Control;
 use crate::error::Result;
+use crate::geometry::Region;
 use crate::physics::{Attenuator, PhotonNoise};
 use crate::scene::{Scene, View};
 pub use forest::{ForestReport, QueryCounts, TreeSettings};
@@ -172,24 +173,6 @@ impl AddAssign for RayCounts {
         self.organ_rays_interpolated += other.organ_rays_interpolated;
         self.organ_rays_skipped_by_bounds += other.organ_rays_skipped_by_bounds;
         self.organ_rays_skipped_unneeded += other.organ_rays_skipped_unneeded;
-    }
-}
-
-/// A rectangle of pixels.
-#[derive(Clone, Debug)]
-struct Region {
-    columns: Range<u32>,
-    rows: Range<u32>,
-}
-
-impl Region {
-    fn pixels(&self) -> usize {
-        self.columns.len() * self.rows.len()
-    }
-
-    /// Column and row of each pixel, row by row: the order of all lists of a tile.
-    fn places(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
-        self.rows.clone().flat_map(|row| self.columns.clone().map(move |column| (column, row)))
     }
 }
 

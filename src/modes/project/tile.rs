@@ -2,9 +2,9 @@
 
 use super::forest::{Forest, Grove, QueryCounts, holds_box};
 use super::sweep::own_stretches;
-use super::{Found, Projector, RayCounts, Region, Tile};
+use super::{Found, Projector, RayCounts, Tile};
 use crate::attributes::chord::ChordLength;
-use crate::geometry::{Interval, Segment};
+use crate::geometry::{Interval, Region, Segment};
 use crate::physics::composite::composite;
 use crate::physics::{Appearance, RowMass};
 use crate::ritree::RiTree;
