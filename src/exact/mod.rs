@@ -7,7 +7,11 @@
 
 pub mod bvh;
 pub mod clip;
+#[cfg(test)]
+mod judge;
 mod record;
+mod shear;
+pub mod walk;
 
 pub use record::{Lengths, Pierce, Pierced, Record, Spans, Way};
 

@@ -11,6 +11,9 @@ impl Interval {
     /// The whole line.
     pub const EVERYTHING: Self = Self { start: f64::NEG_INFINITY, end: f64::INFINITY };
 
+    /// From 0 to 1.
+    pub const UNIT: Self = Self { start: 0.0, end: 1.0 };
+
     /// The interval, or `None` if `start > end` or an end is NaN.
     pub fn new(start: f64, end: f64) -> Option<Self> {
         (start <= end).then_some(Self { start, end })

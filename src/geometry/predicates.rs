@@ -13,29 +13,34 @@ pub fn side_of_plane([a, b, c]: [DVec3; 3], p: DVec3) -> std::cmp::Ordering {
     0.0.partial_cmp(&below).unwrap_or(std::cmp::Ordering::Equal)
 }
 
-/// Whether the plane point `p`, moved by an infinitesimal (ε, ε²), lies in the triangle, and if so how it is wound:
-/// +1 counter-clockwise, −1 clockwise, 0 outside (or the triangle has no area).
+/// On which side of the directed line from `u` to `v` the plane point `p`, moved by an infinitesimal (ε, ε²), lies: +1 to
+/// the left, −1 to the right, 0 only if `u` and `v` are one point. Exact, and the negative of the side of `v` to `u`.
 ///
-/// The infinitesimal move (simulation of simplicity, Edelsbrunner & Mücke 1990, doi:10.1145/77635.77639) gives every
-/// point to exactly one of the triangles that share an edge or a vertex, by exact signs: nothing is counted twice or
+/// The infinitesimal move (simulation of simplicity, Edelsbrunner & Mücke 1990, doi:10.1145/77635.77639) decides ties alike
+/// for all who ask.
+pub fn side_of_edge(u: [f64; 2], v: [f64; 2], p: [f64; 2]) -> i32 {
+    let coord = |q: [f64; 2]| Coord { x: q[0], y: q[1] };
+    let area = robust::orient2d(coord(u), coord(v), coord(p));
+    if area != 0.0 {
+        return if area > 0.0 { 1 } else { -1 };
+    }
+    // d/dε of the area under p + (ε, ε²): first −(v.y − u.y), then v.x − u.x.
+    match (u[1].partial_cmp(&v[1]), v[0].partial_cmp(&u[0])) {
+        (Some(std::cmp::Ordering::Greater), _) => 1,
+        (Some(std::cmp::Ordering::Less), _) => -1,
+        (_, Some(std::cmp::Ordering::Greater)) => 1,
+        (_, Some(std::cmp::Ordering::Less)) => -1,
+        _ => 0,
+    }
+}
+
+/// Whether the plane point `p`, moved as in [`side_of_edge`], lies in the triangle, and if so how it is wound: +1
+/// counter-clockwise, −1 clockwise, 0 outside (or the triangle has no area).
+///
+/// So every point belongs to exactly one of the triangles that share an edge or a vertex: nothing is counted twice or
 /// lost.
 pub fn cover([a, b, c]: [[f64; 2]; 3], p: [f64; 2]) -> i32 {
-    let sign = |u: [f64; 2], v: [f64; 2]| {
-        let coord = |q: [f64; 2]| Coord { x: q[0], y: q[1] };
-        let area = robust::orient2d(coord(u), coord(v), coord(p));
-        if area != 0.0 {
-            return if area > 0.0 { 1 } else { -1 };
-        }
-        // d/dε of the area under p + (ε, ε²): first −(v.y − u.y), then v.x − u.x.
-        match (u[1].partial_cmp(&v[1]), v[0].partial_cmp(&u[0])) {
-            (Some(std::cmp::Ordering::Greater), _) => 1,
-            (Some(std::cmp::Ordering::Less), _) => -1,
-            (_, Some(std::cmp::Ordering::Greater)) => 1,
-            (_, Some(std::cmp::Ordering::Less)) => -1,
-            _ => 0,
-        }
-    };
-    let (first, second, third) = (sign(a, b), sign(b, c), sign(c, a));
+    let (first, second, third) = (side_of_edge(a, b, p), side_of_edge(b, c, p), side_of_edge(c, a, p));
     if first == second && second == third { first } else { 0 }
 }
 

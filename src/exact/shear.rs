@@ -1,0 +1,74 @@
+//! The frame in which a line is the third axis: vertices are sheared along it, not turned, so that each is rounded by
+//! itself (Woop, Benthin & Wald 2013, <https://jcgt.org/published/0002/01/05/>).
+//!
+//! ```text
+//!      y │   · v            y │ · v      across = (p.x − sx·p.z, p.y − sy·p.z)
+//!        │  ╱               (0,0)        along  =  p.z / d.z
+//!      o ●───── z   ───▶      ●── x      with p = v − o, sx = d.x/d.z, sy = d.y/d.z, and z the axis along which the
+//!         ╲ line             (the line)  direction is longest: |sx|, |sy| ≤ 1
+//! ```
+
+use glam::DVec3;
+
+use crate::geometry::Line;
+
+/// A line's frame. Counter-clockwise seen against the line stays counter-clockwise.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shear {
+    origin: DVec3,
+    /// What x, y and z of a place add to its coordinates across: 1 for the axis that becomes the coordinate, less the
+    /// slope for the axis along the line, else 0.
+    across: [[f64; 2]; 3],
+    /// What they add to the place along.
+    along: DVec3,
+}
+
+impl Shear {
+    /// The frame of `line`.
+    #[inline(always)]
+    pub fn new(line: &Line) -> Self {
+        Self::of(line.origin(), line.dir())
+    }
+
+    /// The frame of the line from `origin` along `dir`, which may have any length but 0; places along are in its unit.
+    #[inline(always)]
+    pub fn of(origin: DVec3, dir: DVec3) -> Self {
+        let (d, a) = (dir.to_array(), dir.abs());
+        let z = if a.x >= a.y.max(a.z) { 0 } else { 1 + usize::from(a.z > a.y) };
+        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
+        // A mirrored frame would turn all windings round.
+        let [first, second] = if d[z] < 0.0 { [y, x] } else { [x, y] };
+        let (to_first, to_second, inverse) = (-d[first] / d[z], -d[second] / d[z], 1.0 / d[z]);
+        // Chosen, not stored by index: what is stored piecemeal is slow to load whole.
+        let part = |axis: usize, own: usize, slope: f64| {
+            if axis == own {
+                1.0
+            } else if axis == z {
+                slope
+            } else {
+                0.0
+            }
+        };
+        let row = |axis: usize| [part(axis, first, to_first), part(axis, second, to_second)];
+        let along = |axis: usize| if axis == z { inverse } else { 0.0 };
+        Self { origin, across: [row(0), row(1), row(2)], along: DVec3::new(along(0), along(1), along(2)) }
+    }
+
+    /// Where `vertex` lies across the line, which is at (0, 0): a function of the vertex and the line alone, whichever face
+    /// asks.
+    ///
+    /// Each coordinate is the sum of two products, one with 1, and errs by γ₂ of the one and γ₄ of the other (difference,
+    /// slope, product, sum): γ₄ of twice the largest coordinate of v − o. The products with 0 are exact.
+    #[inline(always)]
+    pub fn across(&self, vertex: DVec3) -> [f64; 2] {
+        let p = vertex - self.origin;
+        let [x, y, z] = self.across;
+        [(p.x * x[0] + p.y * y[0]) + p.z * z[0], (p.x * x[1] + p.y * y[1]) + p.z * z[1]]
+    }
+
+    /// Where `vertex` lies along the line, in the direction's length; errs by γ₃ of itself.
+    #[inline(always)]
+    pub fn along(&self, vertex: DVec3) -> f64 {
+        (vertex - self.origin).dot(self.along)
+    }
+}

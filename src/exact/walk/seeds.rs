@@ -1,0 +1,226 @@
+//! From a line to faces near its entry and its exit: where walks begin if nothing is known.
+//!
+//! ```text
+//!      z            A linear map makes a ball of the body's ellipsoid of inertia. Where the line crosses the ball, the
+//!     ╱|╲           direction from the middle is flattened onto the octahedron |x| + |y| + |z| = 1 and that onto a square
+//!    ╱ | ╲          (Cigolle et al. 2014, <https://jcgt.org/published/0003/02/01/>). Each cell of the square names the face
+//!   x──┼──y         through which its direction leaves the body, and how far away that is.
+//! ```
+//!
+//! For an ellipsoid the ball is the body; elsewhere the distance found first says where to look again.
+
+use glam::{DMat3, DVec3};
+use nalgebra::Matrix3;
+
+use super::{Face, LineView, Seeds, Walker};
+use crate::geometry::numeric::gamma;
+
+/// A table of faces by direction from the middle.
+#[derive(Clone, Debug)]
+pub(super) struct SeedTable {
+    middle: DVec3,
+    /// From mm about the middle to the frame in which the body is about a ball of radius 1.
+    to_ball: DMat3,
+    /// The squared radius of the ball about the middle that holds the body.
+    holding_squared: f64,
+    /// About half the width of a few faces: so far within the outline are seeds for lines that pass by.
+    inset: f64,
+    /// Cells along each side of the square.
+    side: usize,
+    cells: Vec<Seed>,
+}
+
+/// A face, and its distance from the middle in the ball's frame.
+#[derive(Clone, Copy, Debug, Default)]
+struct Seed {
+    face: u32,
+    radius: f32,
+}
+
+/// The table has a cell for some two faces, and no more than a second-level cache holds.
+const LARGEST_SIDE: usize = 256;
+const SMALLEST_SIDE: usize = 4;
+
+/// A face seen less edge-on than this looks along a line whatever the rounding.
+const FACING: f64 = 1e-3;
+
+/// Where the surface's distance differs from what was assumed by more than this share, it is looked up again.
+const RADIUS_TOLERANCE: f64 = 0.02;
+
+/// A line passes a ball by surely if its squared distance from the middle is greater by this share of the origin's squared
+/// distance: two linear maps of three products each, the foot of the perpendicular, a square: fewer than 40 roundings.
+const PASSING_BY: f64 = gamma(64);
+
+impl SeedTable {
+    /// A table that knows no face but the first.
+    pub fn empty() -> Self {
+        Self {
+            middle: DVec3::ZERO,
+            to_ball: DMat3::IDENTITY,
+            holding_squared: f64::INFINITY,
+            inset: 0.0,
+            side: 1,
+            cells: vec![Seed::default()],
+        }
+    }
+
+    /// The table of a body.
+    pub fn new(walker: &Walker) -> Self {
+        let side = (walker.faces.len() / 2).isqrt().clamp(SMALLEST_SIDE, LARGEST_SIDE);
+        let (middle, to_ball) = ball_of_inertia(walker);
+        let radius_squared = |v: &DVec3| (to_ball * (*v - middle)).length_squared();
+        let farthest = walker.vertices.iter().map(radius_squared).fold(0.0, f64::max);
+        let mut table = Self {
+            middle,
+            to_ball,
+            holding_squared: farthest * (1.0 + PASSING_BY),
+            inset: 6.0 / (walker.faces.len() as f64).sqrt(),
+            side,
+            cells: vec![Seed::default(); side * side],
+        };
+        let from_ball = to_ball.inverse();
+        let mut face = 0;
+        for row in 0..side {
+            for i in 0..side {
+                // Back and forth, so that each walk begins next to where the last ended.
+                let column = if row % 2 == 0 { i } else { side - 1 - i };
+                let towards = from_ball * direction([column, row].map(|c| (c as f64 + 0.5) / side as f64));
+                face = leaving(walker, middle, towards, face);
+                let corner = walker.vertices[walker.faces[face as usize].corners[0] as usize];
+                let radius = radius_squared(&corner).sqrt() as f32;
+                table.cells[row * side + column] = Seed { face, radius };
+            }
+        }
+        table
+    }
+
+    /// Seeds for the line from `o` along `d`, mm: the faces near where it would cross a ball about the middle as large as
+    /// the body is there. `None` if it passes the ball by that holds the body, and so misses.
+    #[inline]
+    pub fn near(&self, o: DVec3, d: DVec3) -> Option<Seeds> {
+        let (o, d) = (self.to_ball * (o - self.middle), self.to_ball * d);
+        let inverse = 1.0 / d.length_squared();
+        let foot = o - (o.dot(d) * inverse) * d;
+        let offset_squared = foot.length_squared();
+        if offset_squared > self.holding_squared + PASSING_BY * o.length_squared() {
+            return None;
+        }
+        let crossing = |sign: f64| {
+            let at = |radius: f64| {
+                let half = (radius * radius - offset_squared).max(self.inset * self.inset) * inverse;
+                self.cell(foot + (sign * half.sqrt()) * d)
+            };
+            let first = at(1.0);
+            let radius = f64::from(first.radius);
+            if (radius - 1.0).abs() > RADIUS_TOLERANCE { at(radius).face } else { first.face }
+        };
+        Some(Seeds { entry: crossing(-1.0), exit: crossing(1.0) })
+    }
+
+    /// Whether the line from `o` along `d`, mm, passes the ball by that holds the body, and so misses, surely.
+    #[inline]
+    pub fn passes_by(&self, o: DVec3, d: DVec3) -> bool {
+        let (o, d) = (self.to_ball * (o - self.middle), self.to_ball * d);
+        let foot = o - (o.dot(d) / d.length_squared()) * d;
+        foot.length_squared() > self.holding_squared + PASSING_BY * o.length_squared()
+    }
+
+    /// A face that looks along `dir`.
+    pub fn towards(&self, walker: &Walker, dir: DVec3) -> u32 {
+        let face = self.cell(self.to_ball * dir).face;
+        let looks_along = walker.faces[face as usize].normal.dot(dir) > FACING * dir.length();
+        if looks_along { face } else { leaving(walker, self.middle, dir, face) }
+    }
+
+    #[inline]
+    fn cell(&self, towards: DVec3) -> Seed {
+        let [x, y] = flattened(towards);
+        let size = self.side as f64;
+        let (x, y) = (((x * size) as usize).min(self.side - 1), ((y * size) as usize).min(self.side - 1));
+        self.cells[y * self.side + x]
+    }
+}
+
+/// The centroid of the body's volume, and the map from mm about it to a frame in which its second moments are those of the
+/// unit ball. A body too flat for that is scaled by its box alone.
+fn ball_of_inertia(walker: &Walker) -> (DVec3, DMat3) {
+    let (mut volume, mut first, mut second) = (0.0, DVec3::ZERO, Matrix3::<f64>::zeros());
+    let outer = |v: DVec3| {
+        let v = nalgebra::Vector3::from(v.to_array());
+        v * v.transpose()
+    };
+    for face in &walker.faces {
+        // The tetrahedron from the box's centre.
+        let [a, b, c] = face.corners.map(|v| walker.vertices[v as usize] - walker.centre);
+        let part = a.dot(b.cross(c)) / 6.0;
+        volume += part;
+        first += part * (a + b + c);
+        second += (outer(a) + outer(b) + outer(c) + outer(a + b + c)) * part;
+    }
+    let middle = first / (4.0 * volume);
+    // The second moments of a ball of radius 1 over its volume are 1/5.
+    let spread = (second / (20.0 * volume) - outer(middle)) * 5.0;
+    let to_ball = spread
+        .cholesky()
+        .and_then(|root| root.l().try_inverse())
+        .map(|m| DMat3::from_cols_array(&std::array::from_fn(|i| m[(i % 3, i / 3)])));
+    let by_box = || DMat3::from_diagonal(DVec3::splat(1.0 / walker.reach));
+    (walker.centre + middle, to_ball.filter(|m| m.is_finite()).unwrap_or_else(by_box))
+}
+
+/// The face through which the ray from a point within the body leaves: by a walk from a face nearby that looks along it, or
+/// else as the nearest plane of all.
+fn leaving(walker: &Walker, from: DVec3, dir: DVec3, near: u32) -> u32 {
+    let view = LineView::new(walker, from, dir);
+    let start = walker.stand_on(&view, near, 1.0);
+    if start.area() > view.sure_mm2
+        && let Ok(Some(pierced)) = walker.walk(&view, start, &mut near.clone(), 1.0)
+    {
+        return pierced.face();
+    }
+    let inverse_distance = |f: &usize| {
+        let Face { normal, corners: [corner, ..], .. } = walker.faces[*f];
+        let height = normal.dot(walker.vertices[corner as usize] - from);
+        if height > 0.0 { normal.dot(dir) / height } else { f64::NEG_INFINITY }
+    };
+    let faces = 0..walker.faces.len();
+    faces.max_by(|f, g| inverse_distance(f).total_cmp(&inverse_distance(g))).unwrap_or(0) as u32
+}
+
+/// The place of a direction in the unit square.
+#[inline]
+fn flattened(v: DVec3) -> [f64; 2] {
+    let inverse = 1.0 / (v.x.abs() + v.y.abs() + v.z.abs());
+    let (x, y) = (v.x * inverse, v.y * inverse);
+    let (far_x, far_y) = ((1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y));
+    let is_far = v.z < 0.0;
+    [0.5 * if is_far { far_x } else { x } + 0.5, 0.5 * if is_far { far_y } else { y } + 0.5]
+}
+
+/// The direction of a place in the unit square; not of unit length.
+fn direction(place: [f64; 2]) -> DVec3 {
+    let [x, y] = place.map(|c| 2.0 * c - 1.0);
+    let z = 1.0 - x.abs() - y.abs();
+    if z >= 0.0 {
+        return DVec3::new(x, y, z);
+    }
+    DVec3::new((1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y), z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn flattening_a_direction_and_back_gives_the_direction() {
+        for x in -3..=3 {
+            for y in -3..=3 {
+                for z in -3..=3 {
+                    let v = DVec3::new(f64::from(x), f64::from(y), f64::from(z) + 0.1);
+                    let back = direction(flattened(v));
+                    assert!(back.normalize().dot(v.normalize()) > 1.0 - 1e-12, "{v} {back}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! Walks for sets of rays: the rays of an image, each from where the last one ended, and batches in any order.
+
+use std::hint::black_box;
+
+use super::{Pass, Seeds, Unsure, Walker};
+use crate::exact::{Record, Way};
+use crate::geometry::{Interval, RayGrid, Region, Segment};
+
+/// Rays of a batch looked up together, so that their ways to memory overlap.
+const TOGETHER: usize = 32;
+
+/// Bodies of fewer faces stay in the second-level cache, where reading ahead gains nothing.
+const FACES_IN_CACHE: usize = 10_000;
+
+impl Walker {
+    /// Records the crossings of each ray of `region`, numbered row by row; rays in doubt go to `other`.
+    pub fn trace_grid<R: Record>(
+        &self,
+        grid: &RayGrid,
+        region: &Region,
+        record: &mut R,
+        mut other: impl FnMut(usize, &Segment, &mut R),
+    ) {
+        let mut of_row = None;
+        let mut ray = 0;
+        for row in region.rows.clone() {
+            // Each row begins where the one above began.
+            let (mut seeds, mut missed) = (of_row, true);
+            for column in region.columns.clone() {
+                let target = grid.point(column, row);
+                let origin = grid.start_of(target);
+                let dir = target - origin;
+                // Where one ray misses, the next may pass by far enough to say so at once.
+                let answer = if missed && self.seeds.passes_by(origin, dir) {
+                    Ok(None)
+                } else {
+                    let near = seeds.get_or_insert_with(|| self.seeds.near(origin, dir).unwrap_or(FIRST));
+                    let answer = self.pass_from(origin, dir, near);
+                    of_row = of_row.filter(|_| column != region.columns.start).or(seeds);
+                    answer
+                };
+                missed = answer == Ok(None);
+                match answer {
+                    // The direction reaches from the source to the target: the segment is 0 to 1.
+                    Ok(Some(pass)) => note(record, ray, &pass, UNIT, dir.length()),
+                    Ok(None) => {}
+                    Err(Unsure) => other(ray, &grid.segment(column, row), record),
+                }
+                ray += 1;
+            }
+        }
+    }
+
+    /// Records the crossings of each ray, numbered from `first`; rays in doubt go to `other`.
+    pub fn trace_batch<R: Record>(
+        &self,
+        first: usize,
+        rays: &[Segment],
+        record: &mut R,
+        mut other: impl FnMut(usize, &Segment, &mut R),
+    ) {
+        let mut seeds = [None; TOGETHER];
+        for (i, rays) in rays.chunks(TOGETHER).enumerate() {
+            for (seeds, ray) in seeds.iter_mut().zip(rays) {
+                *seeds = self.seeds.near(ray.line().origin(), ray.line().dir());
+            }
+            self.touch(&seeds[..rays.len()]);
+            for (j, (seeds, ray)) in seeds.iter_mut().zip(rays).enumerate() {
+                let Some(seeds) = seeds else { continue };
+                let number = first + i * TOGETHER + j;
+                match self.pass_from(ray.line().origin(), ray.line().dir(), seeds) {
+                    Ok(Some(pass)) => note(record, number, &pass, ray.reach(), 1.0),
+                    Ok(None) => {}
+                    Err(Unsure) => other(number, ray, record),
+                }
+            }
+        }
+    }
+
+    /// Reads what the walks will begin with: many reads that do not wait for each other, where each walk would wait for its
+    /// own.
+    fn touch(&self, seeds: &[Option<Seeds>]) {
+        if self.faces.len() < FACES_IN_CACHE {
+            return;
+        }
+        let faces = || {
+            seeds.iter().flatten().flat_map(|s| [&self.faces[s.entry as usize], &self.faces[s.exit as usize]])
+        };
+        black_box(faces().fold(0, |sum: u32, face| sum.wrapping_add(face.corners[0])));
+        let corners = faces().flat_map(|face| face.corners);
+        black_box(
+            corners.fold(0, |sum: u64, corner| sum.wrapping_add(self.vertices[corner as usize].x.to_bits())),
+        );
+    }
+}
+
+/// Seeds as good as none.
+const FIRST: Seeds = Seeds { entry: 0, exit: 0 };
+
+/// A whole path, in its own length.
+const UNIT: Interval = Interval::UNIT;
+
+/// Records a pass, cut to the reach of its ray.
+#[inline]
+fn note(record: &mut impl Record, ray: usize, pass: &Pass, reach: Interval, unit_mm: f64) {
+    if let Some(part) = pass.chord.intersection(&reach).filter(|part| part.length() > 0.0) {
+        record.crossing(ray, part.start() * unit_mm, pass.entry_face, Way::In);
+        record.crossing(ray, part.end() * unit_mm, pass.exit_face, Way::Out);
+    }
+}
