@@ -7,6 +7,7 @@
 
 pub mod bvh;
 pub mod clip;
+pub mod raster;
 mod record;
 
 pub use record::{Lengths, Pierce, Pierced, Record, Spans, Way};
