@@ -9,6 +9,7 @@ pub mod bvh;
 pub mod clip;
 #[cfg(test)]
 mod judge;
+pub mod raster;
 mod record;
 mod shear;
 pub mod walk;

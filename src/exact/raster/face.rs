@@ -1,0 +1,157 @@
+//! One face in the image: which pixels of a row it covers, and how deep it is there.
+//!
+//! ```text
+//!              high
+//!             ╱   ╲          rows below `mid`: between the long edge low–high and the edge low–mid
+//!    long ─▶ ╱     ╲         rows above:       between the long edge and the edge mid–high
+//!           ╱       mid
+//!         low ───╯           a row's pixels: from the ceiling of one crossing to before the ceiling of the other
+//! ```
+//!
+//! A pixel centre stands for the point moved by an infinitesimal (ε, ε²), as in
+//! [`cover`](crate::geometry::predicates::cover): a vertex on a row counts as below it, and a centre on an edge as right of it.
+//! So an edge crosses those rows r with y₀ ≤ r < y₁, and the centres left of it are those below the ceiling of its
+//! crossing. That ceiling is exact, hence the same for both faces of an edge, whichever way they go along it.
+
+use robust::{Coord, orient2d};
+
+use super::projection::Place;
+use super::round;
+use crate::geometry::numeric::DoubleDouble;
+
+/// Where an edge crosses rows. Of its ends, the first is the lower.
+#[derive(Clone, Copy)]
+pub struct Edge {
+    low: Place,
+    high: Place,
+    slope: f64,
+}
+
+impl Edge {
+    #[inline(always)]
+    pub fn new(low: Place, high: Place) -> Self {
+        Self { low, high, slope: (high.x - low.x) / (high.y - low.y) }
+    }
+
+    /// The first column whose pixel is not left of the edge, in a row that the edge crosses. `tolerance` bounds the rounding
+    /// of a crossing.
+    #[inline(always)]
+    pub fn first_right(&self, row: i32, tolerance: f64) -> i32 {
+        let crossing = self.low.x + (f64::from(row) - self.low.y) * self.slope;
+        let (column, above) = round::nearest(crossing);
+        if above.abs() <= tolerance {
+            return self.first_right_exact(row, column);
+        }
+        column + i32::from(above > 0.0)
+    }
+
+    /// As above, if the crossing is too near to this column to tell.
+    #[cold]
+    #[inline(never)]
+    fn first_right_exact(&self, row: i32, column: i32) -> i32 {
+        let coord = |p: Place| Coord { x: p.x, y: p.y };
+        let centre = Coord { x: f64::from(column), y: f64::from(row) };
+        let is_left = orient2d(coord(self.low), coord(self.high), centre) > 0.0;
+        column + i32::from(is_left)
+    }
+}
+
+/// How the corners of a face lie, lowest first, and whether that order is as they are wound. Told by which of
+/// a < b, b < c and c < a hold; corners in the same row may come in any order.
+const ORDERS: [([usize; 3], bool); 8] = [
+    ([0, 1, 2], true),
+    ([0, 2, 1], false),
+    ([1, 0, 2], false),
+    ([0, 1, 2], true),
+    ([2, 1, 0], false),
+    ([2, 0, 1], true),
+    ([1, 2, 0], true),
+    ([0, 1, 2], true),
+];
+
+/// The order of three corners by their rows: see [`ORDERS`].
+#[inline(always)]
+pub fn order([a, b, c]: [i32; 3]) -> ([usize; 3], bool) {
+    ORDERS[usize::from(a < b) | usize::from(b < c) << 1 | usize::from(c < a) << 2]
+}
+
+/// The depth over a face: affine in column and row.
+#[derive(Clone, Copy)]
+pub struct Slope {
+    base: Place,
+    per_column: f64,
+    per_row: f64,
+    /// Of the corners: rounding may not put a crossing off the face.
+    lowest: f64,
+    highest: f64,
+}
+
+/// When a slope in f64 would not do, as factors of extents in columns or rows, and in depth.
+#[derive(Clone, Copy, Debug)]
+pub struct Care {
+    pub per_pixel: f64,
+    pub per_depth: f64,
+}
+
+impl Slope {
+    /// The slope of a face, and its depth kept within `limits`.
+    ///
+    /// In f64 the slope errs, over the face's extents Eₓ, E_y, E_z, by γ₁₂ · Eₓ E_y E_z / |area| in depth, and by as much as
+    /// a move of γ₁₂ · Eₓ E_y max(Eₓ, E_y) / |area| in place. Where that is more than the roundings of the corners (needles,
+    /// and faces seen almost edge-on) it is taken in double-double.
+    #[inline(always)]
+    pub fn new([a, b, c]: [Place; 3], care: Care, limits: [f64; 2]) -> Self {
+        let (x1, y1, z1) = (b.x - a.x, b.y - a.y, b.depth - a.depth);
+        let (x2, y2, z2) = (c.x - a.x, c.y - a.y, c.depth - a.depth);
+        let area = x1 * y2 - x2 * y1;
+        let max = |p: f64, q: f64| if p.abs() > q.abs() { p.abs() } else { q.abs() };
+        let (ex, ey, ez) = (max(x1, x2), max(y1, y2), max(z1, z2));
+        let (per_column, per_row) =
+            if ex * ey * (max(ex, ey) * care.per_pixel + ez * care.per_depth) > area.abs() {
+                careful_slopes([a, b, c])
+            } else {
+                let inverse = 1.0 / area;
+                ((z1 * y2 - z2 * y1) * inverse, (z2 * x1 - z1 * x2) * inverse)
+            };
+        let lowest = lesser(a.depth, lesser(b.depth, c.depth));
+        let highest = greater(a.depth, greater(b.depth, c.depth));
+        let clamp = |depth: f64| greater(limits[0], lesser(depth, limits[1]));
+        Self { base: a, per_column, per_row, lowest: clamp(lowest), highest: clamp(highest) }
+    }
+
+    /// The depth over a row, still to be kept within the face.
+    #[inline(always)]
+    pub fn row(&self, row: i32) -> f64 {
+        self.base.depth + self.per_row * (f64::from(row) - self.base.y)
+    }
+
+    /// The depth at a column of that row. A slope that is not a number, of a face without area, gives the face's own depth.
+    #[inline(always)]
+    pub fn depth(&self, of_row: f64, column: f64) -> f64 {
+        let depth = of_row + self.per_column * (column - self.base.x);
+        greater(lesser(depth, self.highest), self.lowest)
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn careful_slopes([a, b, c]: [Place; 3]) -> (f64, f64) {
+    let edge = |to: Place| {
+        [(to.x, a.x), (to.y, a.y), (to.depth, a.depth)].map(|(p, q)| DoubleDouble::difference(p, q))
+    };
+    let ([x1, y1, z1], [x2, y2, z2]) = (edge(b), edge(c));
+    let area = (x1 * y2 - x2 * y1).to_f64();
+    ((z1 * y2 - z2 * y1).to_f64() / area, (z2 * x1 - z1 * x2).to_f64() / area)
+}
+
+/// The lesser of two, the second if the first is not a number; one instruction, which `f64::min` is not.
+#[inline(always)]
+pub fn lesser(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The greater of two, the second if the first is not a number.
+#[inline(always)]
+pub fn greater(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
