@@ -5,6 +5,7 @@
 //! place after the shear depends on the vertex and the line alone, and coverage is decided by exact signs with
 //! ties broken alike for all faces, so that crossings always come in pairs: no line leaks through an edge.
 
+use super::shear::{Shear, Sheared};
 use crate::geometry::numeric::gamma;
 use crate::geometry::predicates::cover;
 use crate::geometry::{Bounds, ClosedMesh, Interval, Line};
@@ -64,43 +65,6 @@ fn merge(parts: &mut Vec<Interval>) {
         }
     }
     parts.truncate(merged + 1);
-}
-
-/// A vertex in the line's frame: two coordinates across, and the place along the line in mm.
-#[derive(Clone, Copy)]
-struct Sheared {
-    across: [f64; 2],
-    along: f64,
-}
-
-struct Shear {
-    origin: DVec3,
-    axes: [usize; 3],
-    slopes: [f64; 2],
-    scale: f64,
-}
-
-impl Shear {
-    fn new(line: &Line) -> Self {
-        let d = line.dir();
-        let z =
-            if d.x.abs() >= d.y.abs().max(d.z.abs()) { 0 } else { 1 + usize::from(d.z.abs() > d.y.abs()) };
-        let (mut x, mut y) = ((z + 1) % 3, (z + 2) % 3);
-        if d[z] < 0.0 {
-            // A mirrored frame would turn all windings round.
-            std::mem::swap(&mut x, &mut y);
-        }
-        Self { origin: line.origin(), axes: [x, y, z], slopes: [d[x] / d[z], d[y] / d[z]], scale: 1.0 / d[z] }
-    }
-
-    fn apply(&self, vertex: DVec3) -> Sheared {
-        let p = vertex - self.origin;
-        let [x, y, z] = self.axes;
-        Sheared {
-            across: [p[x] - self.slopes[0] * p[z], p[y] - self.slopes[1] * p[z]],
-            along: p[z] * self.scale,
-        }
-    }
 }
 
 enum Crossing {

@@ -8,6 +8,7 @@
 pub mod bvh;
 pub mod clip;
 mod record;
+mod shear;
 
 pub use record::{Lengths, Pierce, Pierced, Record, Spans, Way};
 
