@@ -7,12 +7,17 @@
 
 pub mod bvh;
 pub mod clip;
+mod crossing;
+mod parts;
 mod record;
 mod shear;
 
 pub use record::{Lengths, Pierce, Pierced, Record, Spans, Way};
 
+use std::sync::OnceLock;
+
 use crate::geometry::{Bounds, ClosedMesh, ConvexMesh, Interval, Line, NotConvex, Segment};
+use bvh::Bvh;
 use clip::{ConvexClipper, NarrowedClipper};
 
 /// Planes that are clipped in the time of one descent of a box hierarchy.
@@ -26,18 +31,18 @@ pub struct Body {
 
 #[derive(Clone, Debug)]
 enum Form {
-    Convex { mesh: ConvexMesh, clipper: ConvexClipper },
-    General { surface: ClosedMesh, why: NotConvex },
+    Convex { mesh: ConvexMesh, clipper: ConvexClipper, bvh: OnceLock<Bvh> },
+    General { surface: ClosedMesh, bvh: Bvh, why: NotConvex },
 }
 
 impl Body {
     /// The body inside `surface`: clipped if it proves convex, otherwise traced by its box hierarchy.
     pub fn new(surface: ClosedMesh) -> Self {
         let form = match ConvexMesh::new(surface) {
-            Ok(mesh) => Form::Convex { clipper: ConvexClipper::new(&mesh), mesh },
+            Ok(mesh) => Form::Convex { clipper: ConvexClipper::new(&mesh), mesh, bvh: OnceLock::new() },
             Err(refused) => {
                 let (surface, why) = *refused;
-                Form::General { surface, why }
+                Form::General { bvh: Bvh::new(&surface), surface, why }
             }
         };
         Self { form }
@@ -56,6 +61,14 @@ impl Body {
         match &self.form {
             Form::Convex { mesh, .. } => Ok(mesh),
             Form::General { why, .. } => Err(why),
+        }
+    }
+
+    /// The hierarchy over its faces. That of a convex body, which seldom needs it, is built when first asked for.
+    pub fn bvh(&self) -> &Bvh {
+        match &self.form {
+            Form::Convex { mesh, bvh, .. } => bvh.get_or_init(|| Bvh::new(mesh.surface())),
+            Form::General { bvh, .. } => bvh,
         }
     }
 
@@ -79,7 +92,7 @@ impl Body {
                 parts.clear();
                 parts.extend(clipper.chord(line));
             }
-            Form::General { surface, .. } => bvh::chords(surface, line, parts),
+            Form::General { surface, bvh, .. } => bvh.chords(surface, line, parts),
         }
     }
 
@@ -88,7 +101,7 @@ impl Body {
     pub fn chords_of_lone_line(&self, line: &Line, parts: &mut Vec<Interval>) {
         match &self.form {
             Form::Convex { mesh, .. } if mesh.planes().len() > CLIP_PLANES => {
-                bvh::chords(mesh.surface(), line, parts);
+                self.bvh().chords(mesh.surface(), line, parts);
             }
             _ => self.chords(line, parts),
         }
@@ -105,10 +118,10 @@ impl Body {
     /// true for every box that shares a point with the region.
     pub fn narrowed(&self, may_touch: impl Fn(&Bounds) -> bool) -> NarrowedBody<'_> {
         match &self.form {
-            Form::Convex { mesh, clipper } => {
+            Form::Convex { mesh, clipper, .. } => {
                 NarrowedBody::Convex(NarrowedClipper::new(mesh, clipper, may_touch))
             }
-            Form::General { surface, .. } => NarrowedBody::General(surface),
+            Form::General { surface, bvh, .. } => NarrowedBody::General(surface, bvh),
         }
     }
 }
@@ -119,7 +132,7 @@ pub enum NarrowedBody<'a> {
     /// A convex one.
     Convex(NarrowedClipper<'a>),
     /// Any other; its hierarchy is narrow enough.
-    General(&'a ClosedMesh),
+    General(&'a ClosedMesh, &'a Bvh),
 }
 
 impl NarrowedBody<'_> {
@@ -130,8 +143,8 @@ impl NarrowedBody<'_> {
                 parts.clear();
                 parts.extend(clipper.chord(segment).filter(|part| part.length() > 0.0));
             }
-            Self::General(surface) => {
-                bvh::chords(surface, segment.line(), parts);
+            Self::General(surface, bvh) => {
+                bvh.chords(surface, segment.line(), parts);
                 keep_within(segment, parts);
             }
         }

@@ -32,7 +32,7 @@ pub(super) struct Shear {
 
 impl Shear {
     /// The frame of `line`.
-    #[inline]
+    #[inline(always)]
     pub fn new(line: &Line) -> Self {
         let d = line.dir();
         let z =
@@ -45,10 +45,22 @@ impl Shear {
         Self { origin: line.origin(), axes: [x, y, z], slopes: [d[x] / d[z], d[y] / d[z]], scale: 1.0 / d[z] }
     }
 
+    /// The axes that become the first, second and third.
+    #[inline(always)]
+    pub fn axes(&self) -> [usize; 3] {
+        self.axes
+    }
+
+    /// By how much the first and second coordinate of the line grow with the third.
+    #[inline(always)]
+    pub fn slopes(&self) -> [f64; 2] {
+        self.slopes
+    }
+
     /// `vertex` in this frame: a function of the vertex and the line alone, whichever face asks.
     ///
     /// Across errs by γ₂ of |p.x| and γ₄ of |sx·p.z| (difference, slope, product, sum), along by γ₃ of |p.z / d.z|.
-    #[inline]
+    #[inline(always)]
     pub fn apply(&self, vertex: DVec3) -> Sheared {
         let p = (vertex - self.origin).to_array();
         let [x, y, z] = self.axes;
