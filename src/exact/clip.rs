@@ -9,7 +9,10 @@
 //! There are no edge tests, hence no cracks: a ray through a vertex or along an edge is as good as any other.
 //! Cyrus & Beck 1978, doi:10.1016/0097-8493(78)90021-3.
 
-use crate::geometry::{Bounds, ConvexMesh, Interval, Line, Plane, Segment};
+use pulp::{Simd, WithSimd};
+
+use super::{Record, Way};
+use crate::geometry::{ConvexMesh, Interval, Line, Segment};
 
 /// Planes handled side by side; the compiler turns the inner loops into wide instructions.
 const LANES: usize = 4;
@@ -18,6 +21,8 @@ const LANES: usize = 4;
 #[derive(Clone, Debug)]
 pub struct ConvexClipper {
     blocks: Vec<PlaneBlock>,
+    /// A face in each plane.
+    faces: Vec<u32>,
 }
 
 /// `LANES` planes: a point and a normal each. Unused lanes have a zero normal and constrain nothing.
@@ -27,26 +32,77 @@ struct PlaneBlock {
     normal: [[f64; LANES]; 3],
 }
 
+impl PlaneBlock {
+    /// How high a lane's plane lies over the line's origin, mm, and how fast the line rises towards it: the line crosses it
+    /// at the ratio.
+    #[inline(always)]
+    fn crossing(&self, lane: usize, o: [f64; 3], d: [f64; 3]) -> (f64, f64) {
+        let (p, n) = (&self.point, &self.normal);
+        let [nx, ny, nz] = [n[0][lane], n[1][lane], n[2][lane]];
+        let height = nx * (p[0][lane] - o[0]) + ny * (p[1][lane] - o[1]) + nz * (p[2][lane] - o[2]);
+        (height, nx * d[0] + ny * d[1] + nz * d[2])
+    }
+}
+
 impl ConvexClipper {
     /// Lays out all planes of `body`.
     pub fn new(body: &ConvexMesh) -> Self {
-        Self::of_planes(body.planes().iter())
-    }
-
-    fn of_planes<'a>(planes: impl Iterator<Item = &'a Plane>) -> Self {
-        let mut blocks: Vec<PlaneBlock> = Vec::new();
-        for (i, plane) in planes.enumerate() {
-            let lane = i % LANES;
-            if lane == 0 {
-                blocks.push(PlaneBlock::default());
-            }
-            let Some(block) = blocks.last_mut() else { continue };
+        let planes = body.planes();
+        let mut blocks = vec![PlaneBlock::default(); planes.len().div_ceil(LANES)];
+        for (i, plane) in planes.iter().enumerate() {
+            let (block, lane) = (&mut blocks[i / LANES], i % LANES);
             for axis in 0..3 {
                 block.point[axis][lane] = plane.point[axis];
                 block.normal[axis][lane] = plane.normal[axis];
             }
         }
-        Self { blocks }
+        let mut faces = vec![0; planes.len()];
+        for face in (0..body.surface().mesh().faces.len()).rev() {
+            if let Some(plane) = body.plane_of(face) {
+                faces[plane as usize] = face as u32;
+            }
+        }
+        Self { blocks, faces }
+    }
+
+    /// How many planes there are.
+    pub fn plane_count(&self) -> usize {
+        self.faces.len()
+    }
+
+    /// Records where each segment, numbered from `first`, enters and leaves the body, mm from its source. The faces are
+    /// those of the planes that decide; where planes meet on the ray, the first of them.
+    pub fn trace_all<R: Record>(&self, first: usize, segments: &[Segment], record: &mut R) {
+        pulp::Arch::new().dispatch(Trace { clipper: self, first, segments, record });
+    }
+
+    /// As [`trace_all`](Self::trace_all), for one segment.
+    pub fn trace(&self, ray: usize, segment: &Segment, record: &mut impl Record) {
+        self.trace_all(ray, std::slice::from_ref(segment), record);
+    }
+
+    #[inline(always)]
+    fn trace_one<R: Record>(&self, ray: usize, segment: &Segment, record: &mut R) {
+        let Some(chord) = self.chord(segment.line()) else { return };
+        let part = chord.intersection(&segment.reach()).filter(|part| part.length() > 0.0);
+        if let Some(part) = part {
+            let [entry, exit] = if R::ASKS_FACES { self.deciding_faces(segment.line(), chord) } else { [0; 2] };
+            record.crossing(ray, part.start(), entry, Way::In);
+            record.crossing(ray, part.end(), exit, Way::Out);
+        }
+    }
+
+    /// The faces at both ends of the chord of `line`.
+    fn deciding_faces(&self, line: &Line, chord: Interval) -> [u32; 2] {
+        let (o, d) = (line.origin().to_array(), line.dir().to_array());
+        let crosses_at = |plane: usize, t: f64, sign: f64| {
+            let (crossing, slope) = self.blocks[plane / LANES].crossing(plane % LANES, o, d);
+            slope * sign > 0.0 && crossing / slope == t
+        };
+        let face_at = |t: f64, sign: f64| {
+            (0..self.plane_count()).find(|&plane| crosses_at(plane, t, sign)).map_or(0, |plane| self.faces[plane])
+        };
+        [face_at(chord.start(), -1.0), face_at(chord.end(), 1.0)]
     }
 
     /// The part of `line` in the body, mm along `dir`. `None` if it misses or only touches in a point.
@@ -54,17 +110,15 @@ impl ConvexClipper {
     /// The body is closed: a line in a face's plane counts its length in the face. Each plane's crossing is
     /// `n·(v − o) / n·d` with a relative error of γ₈ of |v − o| / |n·d|, so the chord is exact for a line moved by no
     /// more than γ₈ of its distance to the body.
+    #[inline(always)]
     pub fn chord(&self, line: &Line) -> Option<Interval> {
         let (o, d) = (line.origin().to_array(), line.dir().to_array());
         let mut enter = [f64::NEG_INFINITY; LANES];
         let mut leave = [f64::INFINITY; LANES];
         let mut misses = [false; LANES];
         for block in &self.blocks {
-            let (p, n) = (&block.point, &block.normal);
             for i in 0..LANES {
-                let slope = n[0][i] * d[0] + n[1][i] * d[1] + n[2][i] * d[2];
-                let height =
-                    n[0][i] * (p[0][i] - o[0]) + n[1][i] * (p[1][i] - o[1]) + n[2][i] * (p[2][i] - o[2]);
+                let (height, slope) = block.crossing(i, o, d);
                 let t = height / slope;
                 let entering = if slope < 0.0 { t } else { f64::NEG_INFINITY };
                 let leaving = if slope > 0.0 { t } else { f64::INFINITY };
@@ -82,71 +136,22 @@ impl ConvexClipper {
     }
 }
 
-/// A convex body narrowed to the planes that matter within a region, for many segments in that region.
-///
-/// Let F be the region (convex) and Q the intersection of the half-spaces of those faces that touch F. Q holds the
-/// body, so a segment that misses Q misses the body. And if the body meets F at all, the two are one within F: were
-/// a point p of Q ∩ F not in the body, the path within F from the body to p would leave the body through a face that
-/// touches F, and p would lie beyond that face's plane, hence not in Q. Whether the body meets F is proved by the
-/// first segment that all planes say hits; until then every hit is asked of all planes. If no face touches F, it
-/// lies wholly inside or wholly outside, and one segment tells for all.
-///
-/// So the chord is that of [`ConvexClipper::chord`] up to its error bound: a plane left out can only have been
-/// decisive within rounding.
-#[derive(Clone, Debug)]
-pub struct NarrowedClipper<'a> {
-    all: &'a ConvexClipper,
-    /// `None` if narrowing saves nothing.
-    near: Option<ConvexClipper>,
-    body_in_region: Known,
+/// [`ConvexClipper::trace_all`], compiled for each set of wide instructions.
+struct Trace<'a, R> {
+    clipper: &'a ConvexClipper,
+    first: usize,
+    segments: &'a [Segment],
+    record: &'a mut R,
 }
 
-/// Whether a body meets a region.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Known {
-    NotYet,
-    Meets,
-    Misses,
-}
+impl<R: Record> WithSimd for Trace<'_, R> {
+    type Output = ();
 
-impl<'a> NarrowedClipper<'a> {
-    /// Narrows `all`, the clipper of `body`, to a convex region. `may_touch` must be true for every box that shares
-    /// a point with the region.
-    pub fn new(body: &ConvexMesh, all: &'a ConvexClipper, may_touch: impl Fn(&Bounds) -> bool) -> Self {
-        let mut planes = Vec::new();
-        let mesh = body.surface().mesh();
-        body.surface().tree().visit(&may_touch, |face| {
-            if may_touch(&Bounds::of(mesh.triangle(face as usize))) {
-                planes.extend(body.plane_of(face as usize));
-            }
-        });
-        planes.sort_unstable();
-        planes.dedup();
-        let all_planes = body.planes();
-        let near = (2 * planes.len() < all_planes.len())
-            .then(|| ConvexClipper::of_planes(planes.iter().map(|&p| &all_planes[p as usize])));
-        Self { all, near, body_in_region: Known::NotYet }
-    }
-
-    /// The part of `segment`, which must lie in the region, in the body; mm from its source.
-    pub fn chord(&mut self, segment: &Segment) -> Option<Interval> {
-        let reach = segment.reach();
-        let chord_by = |clipper: &ConvexClipper| clipper.chord(segment.line())?.intersection(&reach);
-        let Some(near) = &self.near else { return chord_by(self.all) };
-        if self.body_in_region == Known::Misses {
-            return None;
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (i, segment) in self.segments.iter().enumerate() {
+            self.clipper.trace_one(self.first + i, segment, self.record);
         }
-        let chord = chord_by(near)?;
-        if self.body_in_region == Known::Meets {
-            return Some(chord);
-        }
-        let chord = chord_by(self.all);
-        if chord.is_some() {
-            self.body_in_region = Known::Meets;
-        } else if near.blocks.is_empty() {
-            self.body_in_region = Known::Misses;
-        }
-        chord
     }
 }
 

@@ -1,155 +1,29 @@
 //! Exact chords: the judge of every approximation and the fall-back of every query.
 //!
-//! | engine | bodies | cost per ray | error |
+//! | engine | bodies | rays | cost per ray |
 //! |---|---|---|---|
-//! | [`clip`] | convex | every face plane | γ₈ of the distance, as a shift of the line |
-//! | [`bvh`] | any closed surface | faces near the line | γ₈ of the distance, as a shift of each vertex |
+//! | [`clip`] | convex | any | every face plane: the reference |
+//! | [`walk`] | convex | any | a few faces near entry and exit |
+//! | [`raster`] | any closed surface | of an image | a share of each face seen |
+//! | [`bvh`] | any closed surface | any | the faces near the line |
+//!
+//! All find the chord of a surface whose vertices, or planes, have moved by rounding: by some γ₈ of their distance from the
+//! ray's source. Which one serves when nobody says is [`Body::engine_for_image`] and [`Body::engine_for_rays`]; what of a
+//! crossing is kept is the caller's [`Record`].
 
+mod body;
 pub mod bvh;
 pub mod clip;
+mod crossing;
+mod engine;
 #[cfg(test)]
 mod judge;
+mod parts;
 pub mod raster;
 mod record;
 mod shear;
 pub mod walk;
 
+pub use body::Body;
+pub use engine::{BodyView, Engine};
 pub use record::{Lengths, Pierce, Pierced, Record, Spans, Way};
-
-use crate::geometry::{Bounds, ClosedMesh, ConvexMesh, Interval, Line, NotConvex, Segment};
-use clip::{ConvexClipper, NarrowedClipper};
-
-/// Planes that are clipped in the time of one descent of a box hierarchy.
-const CLIP_PLANES: usize = 200;
-
-/// A closed body, ready for exact chords.
-#[derive(Clone, Debug)]
-pub struct Body {
-    form: Form,
-}
-
-#[derive(Clone, Debug)]
-enum Form {
-    Convex { mesh: ConvexMesh, clipper: ConvexClipper },
-    General { surface: ClosedMesh, why: NotConvex },
-}
-
-impl Body {
-    /// The body inside `surface`: clipped if it proves convex, otherwise traced by its box hierarchy.
-    pub fn new(surface: ClosedMesh) -> Self {
-        let form = match ConvexMesh::new(surface) {
-            Ok(mesh) => Form::Convex { clipper: ConvexClipper::new(&mesh), mesh },
-            Err(refused) => {
-                let (surface, why) = *refused;
-                Form::General { surface, why }
-            }
-        };
-        Self { form }
-    }
-
-    /// Its surface.
-    pub fn surface(&self) -> &ClosedMesh {
-        match &self.form {
-            Form::Convex { mesh, .. } => mesh.surface(),
-            Form::General { surface, .. } => surface,
-        }
-    }
-
-    /// The proof that it is convex, or why it is not.
-    pub fn convexity(&self) -> Result<&ConvexMesh, &NotConvex> {
-        match &self.form {
-            Form::Convex { mesh, .. } => Ok(mesh),
-            Form::General { why, .. } => Err(why),
-        }
-    }
-
-    /// The engine that finds its chords.
-    pub fn engine(&self) -> &'static str {
-        match &self.form {
-            Form::Convex { .. } => "clip",
-            Form::General { .. } => "bvh",
-        }
-    }
-
-    /// The box around it, mm.
-    pub fn bounds(&self) -> Bounds {
-        self.surface().bounds()
-    }
-
-    /// The parts of `line` in the body, mm along `dir`, in order and disjoint; written to `parts`.
-    pub fn chords(&self, line: &Line, parts: &mut Vec<Interval>) {
-        match &self.form {
-            Form::Convex { clipper, .. } => {
-                parts.clear();
-                parts.extend(clipper.chord(line));
-            }
-            Form::General { surface, .. } => bvh::chords(surface, line, parts),
-        }
-    }
-
-    /// As [`chords`](Self::chords), by whichever engine is the faster for one line on its own: beyond some hundred planes
-    /// the box hierarchy, also of convex bodies. Both are exact; they may differ in the last bits.
-    pub fn chords_of_lone_line(&self, line: &Line, parts: &mut Vec<Interval>) {
-        match &self.form {
-            Form::Convex { mesh, .. } if mesh.planes().len() > CLIP_PLANES => {
-                bvh::chords(mesh.surface(), line, parts);
-            }
-            _ => self.chords(line, parts),
-        }
-    }
-
-    /// The parts of `segment` in the body, mm from its source, in order and disjoint; written to `parts`. A source
-    /// or a target inside the body cuts its chord there.
-    pub fn chords_of_segment(&self, segment: &Segment, parts: &mut Vec<Interval>) {
-        self.chords(segment.line(), parts);
-        keep_within(segment, parts);
-    }
-
-    /// The body made ready for many segments in one convex region. `may_touch` must be
-    /// true for every box that shares a point with the region.
-    pub fn narrowed(&self, may_touch: impl Fn(&Bounds) -> bool) -> NarrowedBody<'_> {
-        match &self.form {
-            Form::Convex { mesh, clipper } => {
-                NarrowedBody::Convex(NarrowedClipper::new(mesh, clipper, may_touch))
-            }
-            Form::General { surface, .. } => NarrowedBody::General(surface),
-        }
-    }
-}
-
-/// A body made ready for many segments in one region: see [`Body::narrowed`].
-#[derive(Clone, Debug)]
-pub enum NarrowedBody<'a> {
-    /// A convex one.
-    Convex(NarrowedClipper<'a>),
-    /// Any other; its hierarchy is narrow enough.
-    General(&'a ClosedMesh),
-}
-
-impl NarrowedBody<'_> {
-    /// As [`Body::chords_of_segment`], for a segment in the region.
-    pub fn chords_of_segment(&mut self, segment: &Segment, parts: &mut Vec<Interval>) {
-        match self {
-            Self::Convex(clipper) => {
-                parts.clear();
-                parts.extend(clipper.chord(segment).filter(|part| part.length() > 0.0));
-            }
-            Self::General(surface) => {
-                bvh::chords(surface, segment.line(), parts);
-                keep_within(segment, parts);
-            }
-        }
-    }
-}
-
-/// Cuts parts of a segment's line to the segment.
-fn keep_within(segment: &Segment, parts: &mut Vec<Interval>) {
-    let reach = segment.reach();
-    parts.retain_mut(|part| match part.intersection(&reach) {
-        Some(within) if within.length() > 0.0 => {
-            *part = within;
-            true
-        }
-        _ => false,
-    });
-}

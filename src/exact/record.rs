@@ -23,6 +23,9 @@ pub enum Way {
 /// Engines report each crossing once, those of one ray in any order, and cut to the ray's segment: a source inside the
 /// body is an entry at 0. Entries and exits of a ray are as many.
 pub trait Record {
+    /// Whether the faces gone through are asked for. If not, an engine that would have to look for them reports any.
+    const ASKS_FACES: bool;
+
     /// Ray `ray` goes through `face`, `t_mm` from its source.
     fn crossing(&mut self, ray: usize, t_mm: f64, face: u32, way: Way);
 
@@ -42,6 +45,8 @@ pub trait Record {
 pub struct Lengths<'a>(pub &'a mut [f64]);
 
 impl Record for Lengths<'_> {
+    const ASKS_FACES: bool = false;
+
     #[inline]
     fn crossing(&mut self, ray: usize, t_mm: f64, _face: u32, way: Way) {
         self.0[ray] += if way == Way::Out { t_mm } else { -t_mm };
@@ -65,6 +70,8 @@ pub struct Spans {
 }
 
 impl Record for Spans {
+    const ASKS_FACES: bool = false;
+
     #[inline]
     fn crossing(&mut self, ray: usize, t_mm: f64, _face: u32, way: Way) {
         self.ends.push((ray as u32, t_mm, way));
@@ -113,6 +120,8 @@ pub struct Pierce {
 pub struct Pierced(pub Vec<Pierce>);
 
 impl Record for Pierced {
+    const ASKS_FACES: bool = true;
+
     #[inline]
     fn crossing(&mut self, ray: usize, t_mm: f64, face: u32, way: Way) {
         self.0.push(Pierce { ray: ray as u32, t_mm, face, way });

@@ -12,10 +12,21 @@ use glam::DVec3;
 
 use crate::geometry::Line;
 
+/// A vertex in the line's frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sheared {
+    /// See [`Shear::across`].
+    pub across: [f64; 2],
+    /// See [`Shear::along`].
+    pub along: f64,
+}
+
 /// A line's frame. Counter-clockwise seen against the line stays counter-clockwise.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shear {
     origin: DVec3,
+    /// The axes that become the first, second and third.
+    axes: [usize; 3],
     /// What x, y and z of a place add to its coordinates across: 1 for the axis that becomes the coordinate, less the
     /// slope for the axis along the line, else 0.
     across: [[f64; 2]; 3],
@@ -70,5 +81,23 @@ impl Shear {
     #[inline(always)]
     pub fn along(&self, vertex: DVec3) -> f64 {
         (vertex - self.origin).dot(self.along)
+    }
+
+    /// `vertex` in this frame.
+    #[inline(always)]
+    pub fn apply(&self, vertex: DVec3) -> Sheared {
+        Sheared { across: self.across(vertex), along: self.along(vertex) }
+    }
+
+    /// The axes that become the first, second and third.
+    #[inline(always)]
+    pub fn axes(&self) -> [usize; 3] {
+        self.axes
+    }
+
+    /// By how much the first and second coordinate of the line grow with the third.
+    #[inline(always)]
+    pub fn slopes(&self) -> [f64; 2] {
+        self.across[self.axes[2]].map(|x| -x)
     }
 }

@@ -10,6 +10,11 @@ use super::Bounds;
 const LEAF_ITEMS: usize = 4;
 /// Candidate planes per axis for the surface-area heuristic.
 const BINS: usize = 16;
+/// Splits by cost on the way to a leaf; below them a split halves its items, so that 2³² items make no deeper tree than
+/// `MAX_DEPTH`.
+const COST_SPLITS: usize = 32;
+/// Inner nodes on the way to a leaf, at most.
+pub(crate) const MAX_DEPTH: usize = COST_SPLITS + 32;
 
 /// A binary hierarchy of boxes, split by the surface-area heuristic over binned centres
 /// (Wald 2007, doi:10.1109/RT.2007.4342588). Nodes lie in depth-first order: the left child follows its parent.
@@ -33,13 +38,42 @@ impl BoxTree {
     pub fn build(boxes: &[Bounds]) -> Self {
         let mut items: Vec<u32> = (0..boxes.len() as u32).collect();
         let mut nodes = Vec::with_capacity(boxes.len());
-        split(boxes, &mut items, 0, &mut nodes);
+        split(boxes, &mut items, 0, 0, &mut nodes);
         Self { nodes, items }
     }
 
     /// The box around everything; empty if there are no items.
     pub fn bounds(&self) -> Bounds {
         self.nodes.first().map_or(Bounds::EMPTY, |n| n.bounds)
+    }
+
+    /// Whether there is nothing in it.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// The box of a node; node 0 is the root.
+    pub(crate) fn bounds_of(&self, node: u32) -> Bounds {
+        self.nodes[node as usize].bounds
+    }
+
+    /// The children of an inner node. `None` for a leaf.
+    pub(crate) fn children(&self, node: u32) -> Option<[u32; 2]> {
+        let Node { start, count, .. } = self.nodes[node as usize];
+        (count == 0).then_some([node + 1, start])
+    }
+
+    /// The items in all leaves under a node.
+    pub(crate) fn items_under(&self, node: u32) -> &[u32] {
+        let (mut left, mut right) = (node, node);
+        while let Some([child, _]) = self.children(left) {
+            left = child;
+        }
+        while let Some([_, child]) = self.children(right) {
+            right = child;
+        }
+        let last = self.nodes[right as usize];
+        &self.items[self.nodes[left as usize].start as usize..(last.start + last.count) as usize]
     }
 
     /// Bytes held.
@@ -51,8 +85,7 @@ impl BoxTree {
     ///
     /// `enter` may grow stricter as items are seen, which makes this a branch-and-bound search.
     pub fn visit(&self, mut enter: impl FnMut(&Bounds) -> bool, mut item: impl FnMut(u32)) {
-        // The depth is bounded by the median fall-back in `split`; a Vec guards against the rest.
-        let mut pending: Vec<u32> = Vec::with_capacity(64);
+        let mut pending: Vec<u32> = Vec::with_capacity(MAX_DEPTH + 1);
         if !self.nodes.is_empty() {
             pending.push(0);
         }
@@ -103,7 +136,7 @@ impl BoxTree {
     }
 }
 
-fn split(boxes: &[Bounds], items: &mut [u32], first: usize, nodes: &mut Vec<Node>) {
+fn split(boxes: &[Bounds], items: &mut [u32], first: usize, depth: usize, nodes: &mut Vec<Node>) {
     if items.is_empty() {
         return;
     }
@@ -113,16 +146,17 @@ fn split(boxes: &[Bounds], items: &mut [u32], first: usize, nodes: &mut Vec<Node
     if items.len() <= LEAF_ITEMS {
         return;
     }
-    let middle = partition(boxes, items);
+    let middle = partition(boxes, items, depth < COST_SPLITS);
     let (left, right) = items.split_at_mut(middle);
-    split(boxes, left, first, nodes);
+    split(boxes, left, first, depth + 1, nodes);
     nodes[index].start = nodes.len() as u32;
     nodes[index].count = 0;
-    split(boxes, right, first + middle, nodes);
+    split(boxes, right, first + middle, depth + 1, nodes);
 }
 
-/// Reorders `items` so that the cheapest split is at the returned place, strictly inside.
-fn partition(boxes: &[Bounds], items: &mut [u32]) -> usize {
+/// Reorders `items` so that the cheapest split is at the returned place, strictly inside; the middle one unless
+/// `by_cost`.
+fn partition(boxes: &[Bounds], items: &mut [u32], by_cost: bool) -> usize {
     let centre = |i: u32| boxes[i as usize].centre();
     let centres = Bounds::of(items.iter().map(|&i| centre(i)));
     let extent = centres.size();
@@ -132,7 +166,7 @@ fn partition(boxes: &[Bounds], items: &mut [u32]) -> usize {
     };
 
     let mut best: Option<(f64, usize, usize)> = None;
-    for axis in (0..3).filter(|&a| extent[a] > 0.0) {
+    for axis in (0..3).filter(|&a| by_cost && extent[a] > 0.0) {
         let mut bins = [(Bounds::EMPTY, 0usize); BINS];
         for &i in items.iter() {
             let bin = &mut bins[bin_of(axis, centre(i))];

@@ -15,6 +15,7 @@ pub struct TriMesh {
 
 impl TriMesh {
     /// The three corners of a face.
+    #[inline(always)]
     pub fn triangle(&self, face: usize) -> [DVec3; 3] {
         self.faces[face].map(|v| self.vertices[v as usize])
     }

@@ -21,6 +21,7 @@ mod topology;
 
 pub use bounds::Bounds;
 pub use boxtree::BoxTree;
+pub(crate) use boxtree::MAX_DEPTH;
 pub use closed::ClosedMesh;
 pub use components::check_components;
 pub use convex::{ConvexMesh, NotConvex, Plane};
