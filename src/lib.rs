@@ -25,7 +25,7 @@
 //!
 //! let scene = Scene::phantom("calibration")?;
 //! let wanted = Wanted { lengths: true, attenuation: true, colour: false };
-//! let projector = Projector::new(&scene, wanted, None, Method::Exact)?;
+//! let projector = Projector::new(&scene, wanted, None, Method::Exact(None))?;
 //! for (i, view) in scene.beam.views()?.iter().enumerate() {
 //!     let projection = projector.project(view, i as u64, &Control::none())?;
 //!     let longest = projection.own_length_mm(0).into_iter().fold(0.0, f32::max);

@@ -124,7 +124,7 @@ fn json_goes_to_standard_output_and_nothing_else_does() {
     let run =
         chordfield(folder.path(), &["project", "balls.toml", "--json", "--write", "p", "--threads", "1"]);
     let summary = summary(&run);
-    assert_eq!((&summary["method"], &summary["threads"]), (&"exact".into(), &1.into()));
+    assert_eq!((&summary["method"], &summary["threads"]), (&"ritree".into(), &1.into()));
     let count = |key: &str| summary[key].as_u64().unwrap_or_else(|| panic!("no {key}"));
     assert_eq!(
         count("organ_rays"),

@@ -16,7 +16,7 @@ const EVERYTHING: Wanted = Wanted { lengths: true, attenuation: true, colour: tr
 
 fn project(scene: &Scene, wanted: Wanted) -> Projection {
     let view = &scene.beam.views().expect("a beam")[0];
-    Projector::new(scene, wanted, None, Method::Exact)
+    Projector::new(scene, wanted, None, Method::Exact(None))
         .and_then(|p| p.project(view, 0, &Control::none()))
         .expect("a projection")
 }
@@ -29,7 +29,7 @@ fn sum(values: &[f32]) -> f64 {
 fn parallel_lengths_times_area_are_volumes_at_every_angle() {
     let scene_text = nested_balls(300).replace("[beam]", "[beam]\ngantry_deg = [0, 37, 90]\ncouch_deg = 20");
     let scene = scene(&scene_text).expect("a scene");
-    let projector = Projector::new(&scene, EVERYTHING, None, Method::Exact).expect("a projector");
+    let projector = Projector::new(&scene, EVERYTHING, None, Method::Exact(None)).expect("a projector");
     for view in scene.beam.views().expect("views") {
         let projection = projector.project(&view, 0, &Control::none()).expect("a projection");
         for (i, organ) in scene.organs.iter().enumerate() {
@@ -86,7 +86,7 @@ fn images_are_the_same_bits_for_one_two_and_eight_threads() {
     let with_threads = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         let projection = pool.install(|| {
-            Projector::new(&scene, EVERYTHING, noise, Method::Exact)
+            Projector::new(&scene, EVERYTHING, noise, Method::Exact(None))
                 .and_then(|p| p.project(view, 0, &Control::none()))
         });
         let projection = projection.expect("a projection");
@@ -135,44 +135,7 @@ fn a_cancelled_projection_is_interrupted() {
     let scene = scene(&nested_balls(64)).expect("a scene");
     let view = &scene.beam.views().expect("views")[0];
     let (stop, silent) = (AtomicBool::new(true), |_: u64| {});
-    let projector = Projector::new(&scene, EVERYTHING, None, Method::Exact).expect("a projector");
+    let projector = Projector::new(&scene, EVERYTHING, None, Method::Exact(None)).expect("a projector");
     let stopped = projector.project(view, 0, &Control::new(&stop, &silent));
     assert!(matches!(stopped, Err(Error::Interrupted)));
-}
-
-#[test]
-fn a_body_narrowed_to_a_tile_has_the_chords_of_the_whole_body() {
-    // From afar, from close by and from within; tiles that the body covers, crosses and hardly touches.
-    let mut chords = [0, 0];
-    for source_mm in [1000.0, 60.0, 10.0] {
-        let beam = format!(
-            "[beam]\nsad_mm = {source_mm}\nsdd_mm = {}\ngantry_deg = [0, 37]\ncouch_deg = 20",
-            source_mm + 70.0
-        );
-        let text =
-            nested_balls(48).replace("[beam]", &beam).replace("kind = \"parallel\"", "kind = \"cone\"");
-        let scene = scene(&text).expect("a scene");
-        for (view, organ) in
-            scene.beam.views().expect("views").iter().flat_map(|v| scene.organs.iter().map(move |o| (v, o)))
-        {
-            for tile in 0..36 {
-                let (first_column, first_row) = (8 * (tile % 6), 8 * (tile / 6));
-                let (columns, rows) = (first_column..first_column + 8, first_row..first_row + 8);
-                let frustum = view.frustum(columns.clone(), rows.clone());
-                let mut narrowed = organ.body.narrowed(|bounds| !frustum.misses(bounds));
-                let (mut of_tile, mut of_body) = (Vec::new(), Vec::new());
-                for (column, row) in rows.flat_map(|r| columns.clone().map(move |c| (c, r))) {
-                    let ray = view.segment(column, row);
-                    narrowed.chords_of_segment(&ray, &mut of_tile);
-                    organ.body.chords_of_segment(&ray, &mut of_body);
-                    let length = |parts: &[Interval]| parts.iter().map(Interval::length).sum::<f64>();
-                    // Where planes meet on the ray, the one left out may have been nearer by rounding.
-                    let apart = (length(&of_tile) - length(&of_body)).abs();
-                    assert!(apart < 1e-12, "{} from {source_mm} mm at {column}, {row}: {apart}", organ.name);
-                    chords[usize::from(of_body.is_empty())] += 1;
-                }
-            }
-        }
-    }
-    assert!(chords.iter().all(|&n| n > 1000), "hits and misses: {chords:?}");
 }

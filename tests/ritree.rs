@@ -123,7 +123,7 @@ fn every_ray_is_accounted_for_and_trees_grow_only_where_rays_go() {
     let projector = self::projector(&scene, without);
     let projection = view(&projector, &scene, 0);
     assert_eq!((projection.queries().queries, projector.forest().expect("a forest").trees), (0, 0));
-    let exact = Projector::new(&scene, LENGTHS, None, Method::Exact).expect("a projector");
+    let exact = Projector::new(&scene, LENGTHS, None, Method::Exact(None)).expect("a projector");
     assert_eq!(bits(&projection), bits(&view(&exact, &scene, 0)), "all traced is exact");
 }
 
@@ -135,7 +135,7 @@ fn a_source_inside_the_box_is_traced() {
     );
     let scene = scene(&text).expect("a scene");
     let near = view(&projector(&scene, settings(100_000_000)), &scene, 0);
-    let exact = Projector::new(&scene, LENGTHS, None, Method::Exact).expect("a projector");
+    let exact = Projector::new(&scene, LENGTHS, None, Method::Exact(None)).expect("a projector");
     assert_eq!(near.own_length_mm(0), view(&exact, &scene, 0).own_length_mm(0));
     assert!(near.queries().traced_source_or_target_inside > 0);
 }

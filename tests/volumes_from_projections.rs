@@ -45,7 +45,7 @@ fn every_organ_of_the_adult_has_its_meshs_volume_in_its_projection() {
     let lengths = Wanted { lengths: true, attenuation: false, colour: false };
     for (i, organ) in scene.organs.iter().enumerate() {
         let alone = with_its_children_only(&scene, i);
-        let projector = Projector::new(&alone, lengths, None, Method::Exact).expect("a projector");
+        let projector = Projector::new(&alone, lengths, None, Method::Exact(None)).expect("a projector");
         let view = view_of(organ, DVec3::new(0.37, 0.81, 0.29));
         let projection = projector.project(&view, 0, &Control::none()).expect("a projection");
         let sum: f64 = projection.own_length_mm(0).iter().map(|&l| f64::from(l)).sum();

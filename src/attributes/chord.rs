@@ -70,7 +70,7 @@ impl Attribute for ChordLength<'_> {
     fn sample(&self, point: LinePoint) -> Option<Chord> {
         let mut parts = Vec::new();
         let line = self.space.line_of(point)?;
-        self.body.chords_of_lone_line(&line, &mut parts);
+        self.body.chords(&line, &mut parts);
         // A line along a face may leave and enter again within rounding; a convex body has one chord.
         let (first, last) = (parts.first()?, parts.last()?);
         let (start, end) = (first.start(), last.end());
@@ -138,6 +138,7 @@ mod tests {
     use rand::{RngExt, SeedableRng};
 
     use super::*;
+    use crate::exact::Engine;
     use crate::geometry::primitives::{cube, icosphere};
     use crate::geometry::{ClosedMesh, TriMesh, UnitDir};
     use crate::ritree::{Answer, Cache, Parameters, Reason, RiTree};
@@ -162,7 +163,7 @@ mod tests {
 
     fn exact(body: &Body, line: &Line) -> Option<Interval> {
         let mut parts = Vec::new();
-        body.chords(line, &mut parts);
+        body.chords_by(Engine::Clip, line, &mut parts);
         parts.first().copied()
     }
 

@@ -98,8 +98,8 @@ pub struct ProjectArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Method")]
 pub struct MethodArgs {
-    /// Every length exactly, or by RI-trees (Atalay & Mount) that interpolate exact samples.
-    #[arg(long, value_enum, default_value_t = MethodArg::Exact)]
+    /// By RI-trees (Atalay & Mount) that interpolate exact samples, or every length exactly.
+    #[arg(long, value_enum, default_value_t = MethodArg::Ritree)]
     pub method: MethodArg,
     /// RI-tree: a cell splits if its middle is interpolated worse than this, in half the longest side of the organ's box.
     #[arg(long, value_name = "D", default_value_t = 0.05, allow_negative_numbers = true)]
@@ -133,10 +133,32 @@ pub struct MethodArgs {
 /// A method as an argument.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum MethodArg {
-    /// Every length exactly.
-    Exact,
     /// By RI-trees.
     Ritree,
+    /// Every length exactly, by the quickest engine for each organ and view.
+    Exact,
+    /// Exactly, by clipping convex organs against all their planes: the reference.
+    Clip,
+    /// Exactly, by walking over convex organs from face to face.
+    Walk,
+    /// Exactly, by casting faces on pixels.
+    Raster,
+    /// Exactly, by a hierarchy of boxes.
+    Bvh,
+}
+
+impl MethodArg {
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ritree => "ritree",
+            Self::Exact => "exact",
+            Self::Clip => "clip",
+            Self::Walk => "walk",
+            Self::Raster => "raster",
+            Self::Bvh => "bvh",
+        }
+    }
 }
 
 /// Changes to the scene's `[beam]`.

@@ -8,6 +8,7 @@ use std::time::Instant;
 use super::args::{BeamArgs, BeamKindArg, MethodArg, MethodArgs, PhotonArgs, Product, ProjectArgs};
 use super::{Session, print};
 use crate::error::{Error, Result};
+use crate::exact::Engine;
 use crate::modes::Control;
 use crate::modes::project::{Method, Projector, QueryCounts, RayCounts, TreeSettings, Wanted};
 use crate::output::projection::{self, Products};
@@ -48,10 +49,12 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
     let advance = |rays| bar.inc(rays);
     let control = Control::new(session.cancel(), &advance);
     let (mut counts, mut queries) = (RayCounts::default(), QueryCounts::default());
+    let mut engines = BTreeMap::new();
     let mut records = Vec::new();
     for (index, (view, label)) in views.iter().zip(&labels).enumerate() {
         let projection = projector.project(view, index as u64, &control)?;
         counts += projection.counts();
+        note_engines(&mut engines, projection.engines());
         queries += projection.queries();
         stages.end("project");
         let files = projection::write(&args.output, label, &scene, view, &projection, &products)?;
@@ -65,8 +68,9 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
 
     let files = records.iter().flat_map(|(_, _, files)| files);
     let summary = Summary {
-        method: if ritree.is_some() { "ritree" } else { "exact" },
+        method: args.method.method.name(),
         ritree,
+        engines,
         views: views.len(),
         organs: scene.organs.len(),
         counts,
@@ -214,7 +218,11 @@ fn method(args: &MethodArgs) -> Result<Method> {
         return refuse("--prune-keep", args.prune_keep, "give a share from 0 to 1");
     }
     Ok(match args.method {
-        MethodArg::Exact => Method::Exact,
+        MethodArg::Exact => Method::Exact(None),
+        MethodArg::Clip => Method::Exact(Some(Engine::Clip)),
+        MethodArg::Walk => Method::Exact(Some(Engine::Walk)),
+        MethodArg::Raster => Method::Exact(Some(Engine::Raster)),
+        MethodArg::Bvh => Method::Exact(Some(Engine::Bvh)),
         MethodArg::Ritree => Method::RiTree(TreeSettings {
             parameters: Parameters {
                 distance_threshold: args.distance_threshold,
@@ -226,6 +234,13 @@ fn method(args: &MethodArgs) -> Result<Method> {
             least_planes: args.tree_planes,
         }),
     })
+}
+
+/// Counts the organs of a view by the engine that traced them.
+fn note_engines(counts: &mut BTreeMap<Engine, u64>, of_organs: &[Option<Engine>]) {
+    for engine in of_organs.iter().flatten() {
+        *counts.entry(*engine).or_default() += 1;
+    }
 }
 
 fn wanted(products: &Products) -> Wanted {

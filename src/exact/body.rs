@@ -3,10 +3,10 @@
 use std::sync::OnceLock;
 
 use super::Engine;
+use super::Record;
 use super::bvh::Bvh;
 use super::clip::ConvexClipper;
 use super::walk::{Unsure, Walker};
-use super::Record;
 use crate::geometry::{Bounds, ClosedMesh, ConvexMesh, Interval, Line, NotConvex, RayGrid, Region, Segment};
 
 /// A closed body, ready for exact chords. What an engine needs beyond the surface is made when the engine is first used.
@@ -130,9 +130,11 @@ impl Body {
     /// Records where each ray, numbered from `first`, enters and leaves the body.
     pub fn trace<R: Record>(&self, engine: Engine, first: usize, rays: &[Segment], record: &mut R) {
         match (engine, self.walker_for(engine), self.clipper()) {
-            (Engine::Walk, Some(walker), _) => walker.trace_batch(first, rays, record, |ray, segment, record| {
-                self.trace_doubtful(ray, segment, record);
-            }),
+            (Engine::Walk, Some(walker), _) => {
+                walker.trace_batch(first, rays, record, |ray, segment, record| {
+                    self.trace_doubtful(ray, segment, record);
+                })
+            }
             (Engine::Clip, _, Some(clipper)) => clipper.trace_all(first, rays, record),
             _ => self.bvh().trace_all(self.surface(), first, rays, record),
         }

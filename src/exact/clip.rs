@@ -86,7 +86,8 @@ impl ConvexClipper {
         let Some(chord) = self.chord(segment.line()) else { return };
         let part = chord.intersection(&segment.reach()).filter(|part| part.length() > 0.0);
         if let Some(part) = part {
-            let [entry, exit] = if R::ASKS_FACES { self.deciding_faces(segment.line(), chord) } else { [0; 2] };
+            let [entry, exit] =
+                if R::ASKS_FACES { self.deciding_faces(segment.line(), chord) } else { [0; 2] };
             record.crossing(ray, part.start(), entry, Way::In);
             record.crossing(ray, part.end(), exit, Way::Out);
         }
@@ -100,7 +101,9 @@ impl ConvexClipper {
             slope * sign > 0.0 && crossing / slope == t
         };
         let face_at = |t: f64, sign: f64| {
-            (0..self.plane_count()).find(|&plane| crosses_at(plane, t, sign)).map_or(0, |plane| self.faces[plane])
+            (0..self.plane_count())
+                .find(|&plane| crosses_at(plane, t, sign))
+                .map_or(0, |plane| self.faces[plane])
         };
         [face_at(chord.start(), -1.0), face_at(chord.end(), 1.0)]
     }

@@ -5,7 +5,7 @@ use super::{Body, Record};
 use crate::geometry::{RayGrid, Region};
 
 /// An exact engine.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Engine {
     /// Half-space clipping: [`clip`](super::clip).

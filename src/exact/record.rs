@@ -78,6 +78,37 @@ impl Record for Spans {
     }
 }
 
+/// Both of two records.
+impl<A: Record, B: Record> Record for (A, B) {
+    const ASKS_FACES: bool = A::ASKS_FACES || B::ASKS_FACES;
+
+    #[inline]
+    fn crossing(&mut self, ray: usize, t_mm: f64, face: u32, way: Way) {
+        self.0.crossing(ray, t_mm, face, way);
+        self.1.crossing(ray, t_mm, face, way);
+    }
+
+    #[inline]
+    fn run(&mut self, first: usize, t_mm: &[f64], face: u32, way: Way) {
+        self.0.run(first, t_mm, face, way);
+        self.1.run(first, t_mm, face, way);
+    }
+}
+
+impl<R: Record> Record for &mut R {
+    const ASKS_FACES: bool = R::ASKS_FACES;
+
+    #[inline]
+    fn crossing(&mut self, ray: usize, t_mm: f64, face: u32, way: Way) {
+        (**self).crossing(ray, t_mm, face, way);
+    }
+
+    #[inline]
+    fn run(&mut self, first: usize, t_mm: &[f64], face: u32, way: Way) {
+        (**self).run(first, t_mm, face, way);
+    }
+}
+
 impl Spans {
     /// The parts of the rays in the body, by ray, then in order along it; parts without length are left out. Ready for the
     /// next body afterwards.

@@ -62,7 +62,12 @@ impl Shear {
         };
         let row = |axis: usize| [part(axis, first, to_first), part(axis, second, to_second)];
         let along = |axis: usize| if axis == z { inverse } else { 0.0 };
-        Self { origin, across: [row(0), row(1), row(2)], along: DVec3::new(along(0), along(1), along(2)) }
+        Self {
+            origin,
+            axes: [first, second, z],
+            across: [row(0), row(1), row(2)],
+            along: DVec3::new(along(0), along(1), along(2)),
+        }
     }
 
     /// Where `vertex` lies across the line, which is at (0, 0): a function of the vertex and the line alone, whichever face

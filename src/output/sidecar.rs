@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::projection::WrittenFile;
+use crate::exact::Engine;
 use crate::modes::project::{ForestReport, QueryCounts, RayCounts, SampledError, TreeSettings};
 use crate::physics::{PhotonNoise, Spectrum};
 use crate::scene::organ::{Organ, Origin};
@@ -79,8 +80,6 @@ pub struct OrganRecord {
     pub convex: bool,
     /// How far a vertex stands out of a face's plane at worst, mm, if convex.
     pub reflex_depth_mm: Option<f64>,
-    /// What finds its chords.
-    pub engine: &'static str,
     /// What was mended.
     pub notices: Vec<String>,
 }
@@ -108,7 +107,6 @@ impl OrganRecord {
             own_volume_mm3: organ.own_volume_mm3(organs),
             convex: proof.is_some(),
             reflex_depth_mm: proof.map(|p| p.reflex_depth_mm()),
-            engine: organ.body.engine(),
             notices: organ.notices.clone(),
         }
     }
@@ -205,6 +203,8 @@ pub struct Summary {
     /// Rays, and what was skipped.
     #[serde(flatten)]
     pub counts: RayCounts,
+    /// How many organs each exact engine traced, counted per view. Organs in trees are not among them.
+    pub engines: BTreeMap<Engine, u64>,
     /// What RI-trees did, if they were used.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ritree: Option<TreeSummary>,

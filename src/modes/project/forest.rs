@@ -120,6 +120,20 @@ impl<'a> Forest<'a> {
         Self { trees, bodies, settings, cache, clock: AtomicU32::new(1) }
     }
 
+    /// Whether an organ's body is put in a tree.
+    pub fn grows(&self, organ: usize) -> bool {
+        self.attribute(organ).is_some()
+    }
+
+    fn attribute(&self, organ: usize) -> Option<ChordLength<'a>> {
+        let body = self.bodies[organ];
+        let convex = body.convexity().ok()?;
+        if convex.planes().len() < self.settings.least_planes {
+            return None;
+        }
+        ChordLength::new(body)
+    }
+
     /// The trees, to be asked by one thread for the rays of one tile: the only lock, and not per ray.
     pub fn enter(&self) -> Grove<'_, 'a> {
         // Wrapping, after four thousand million tiles, would cost pruning its judgement for a while, never an answer.
@@ -175,12 +189,7 @@ impl<'a> Forest<'a> {
 impl<'a> Grove<'_, 'a> {
     /// The tree of an organ. `None` if its body is not put in a tree.
     pub fn tree(&self, organ: usize) -> Option<&RiTree<ChordLength<'a>>> {
-        let body = self.forest.bodies[organ];
-        let convex = body.convexity().ok()?;
-        if convex.planes().len() < self.forest.settings.least_planes {
-            return None;
-        }
-        let attribute = ChordLength::new(body)?;
+        let attribute = self.forest.attribute(organ)?;
         let tree = self.trees[organ].get_or_init(|| RiTree::new(attribute, self.forest.settings.parameters));
         tree.tick_to(self.now);
         Some(tree)

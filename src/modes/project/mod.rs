@@ -3,12 +3,11 @@
 //! ```text
 //!             ┌──┬──┬──┐   tiles of 32 × 32 pixels, on all cores
 //!   source ──◁├──┼──┼──┤   tile's frustum misses an organ's box ─► organ skipped for 1024 rays
-//!             └──┴──┴──┘   otherwise: exact chord per ray ─► own lengths ─► p, T · stretches ─► colour
+//!             └──┴──┴──┘   otherwise: chords of all its rays ─► own lengths ─► p, T · stretches ─► colour
 //! ```
 //!
 //! What nobody asked for is not computed: entry order without colour, organs without attenuation if only attenuation
-//! is wanted. A pixel's values depend on its ray and its tile alone (on the tile by a rounding, see
-//! `exact::clip::NarrowedClipper`), so images are the same bits for any number of threads.
+//! is wanted. A pixel's values depend on its ray alone, so images are the same bits for any number of threads.
 
 mod forest;
 mod spot_check;
@@ -22,6 +21,7 @@ use serde::Serialize;
 
 use super::Control;
 use crate::error::Result;
+use crate::exact::Engine;
 use crate::geometry::Region;
 use crate::physics::{Attenuator, PhotonNoise};
 use crate::scene::{Scene, View};
@@ -48,8 +48,9 @@ pub struct Wanted {
 /// How lengths are found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Method {
-    /// Every chord exactly.
-    Exact,
+    /// Every chord exactly: by the quickest engine for each organ and view, or by one engine wherever it
+    /// [serves](Engine::serves).
+    Exact(Option<Engine>),
     /// By one RI-tree per convex organ, whose samples are exact chords; what it does not interpolate is exact.
     RiTree(TreeSettings),
 }
@@ -62,6 +63,8 @@ pub struct Projector<'a> {
     wanted: Wanted,
     /// Organs whose chords are needed, by index.
     traced: Vec<usize>,
+    /// The exact engine asked for.
+    engine: Option<Engine>,
     forest: Option<Forest<'a>>,
 }
 
@@ -88,11 +91,11 @@ impl<'a> Projector<'a> {
             .filter(|&i| needs_own[i] || scene.organs[i].parent.is_some_and(|p| needs_own[p]))
             .collect();
         let bodies = || scene.organs.iter().map(|organ| &organ.body).collect();
-        let forest = match method {
-            Method::Exact => None,
-            Method::RiTree(settings) => Some(Forest::new(bodies(), settings)),
+        let (engine, forest) = match method {
+            Method::Exact(engine) => (engine, None),
+            Method::RiTree(settings) => (None, Some(Forest::new(bodies(), settings))),
         };
-        Ok(Self { scene, attenuator, noise, wanted, traced, forest })
+        Ok(Self { scene, attenuator, noise, wanted, traced, engine, forest })
     }
 
     /// The trees' state. `None` without trees.
@@ -141,7 +144,8 @@ impl<'a> Projector<'a> {
             counts += tile.counts;
             queries += tile.queries;
         }
-        Ok(Projection { columns, rows, tiles, counts, queries })
+        let engines = tracer.engines();
+        Ok(Projection { columns, rows, tiles, counts, queries, engines })
     }
 }
 
@@ -208,9 +212,15 @@ pub struct Projection {
     tiles: Vec<Tile>,
     counts: RayCounts,
     queries: QueryCounts,
+    engines: Vec<Option<Engine>>,
 }
 
 impl Projection {
+    /// By which engine each organ was traced, by its index. `None` if it was not needed, or put in a tree.
+    pub fn engines(&self) -> &[Option<Engine>] {
+        &self.engines
+    }
+
     /// What became of the rays that asked RI-trees.
     pub fn queries(&self) -> QueryCounts {
         self.queries

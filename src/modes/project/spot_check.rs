@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::Projector;
 use super::forest::holds_box;
+use crate::exact::Engine;
 use crate::geometry::Interval;
 use crate::scene::View;
 
@@ -51,12 +52,12 @@ impl Projector<'_> {
                     find(&mut parts);
                     parts.iter().map(Interval::length).sum()
                 };
-                // The hierarchy finds the rays that are worth comparing; clipping, which takes no part in sampling large
-                // bodies, is the judge of them.
-                if near == 0.0 && length_by(&|parts| body.chords_of_lone_line(ray.line(), parts)) == 0.0 {
+                // A walk finds the rays that are worth comparing; clipping, which takes no part in sampling large bodies,
+                // is the judge of them.
+                if near == 0.0 && length_by(&|parts| body.chords(ray.line(), parts)) == 0.0 {
                     continue;
                 }
-                let exact = length_by(&|parts| body.chords_of_segment(&ray, parts));
+                let exact = length_by(&|parts| body.chords_by(Engine::Clip, ray.line(), parts));
                 if exact > 0.0 || near > 0.0 {
                     errors.push((near - exact).abs());
                     total += exact;

@@ -1,14 +1,17 @@
 //! One tile of a projection, from rays to values.
 
+use rayon::prelude::*;
+
 use super::forest::{Forest, Grove, QueryCounts, holds_box};
 use super::sweep::own_stretches;
 use super::{Found, Projector, RayCounts, Tile};
 use crate::attributes::chord::ChordLength;
+use crate::exact::{BodyView, Engine, Lengths, Spans};
 use crate::geometry::{Interval, Region, Segment};
 use crate::physics::composite::composite;
 use crate::physics::{Appearance, RowMass};
 use crate::ritree::RiTree;
-use crate::scene::{Frustum, View};
+use crate::scene::{Frustum, Organ, View};
 
 /// Traces tiles of one view.
 pub struct TileTracer<'a, 's> {
@@ -16,6 +19,8 @@ pub struct TileTracer<'a, 's> {
     view: &'a View,
     view_index: u64,
     appearances: Vec<Appearance>,
+    /// The organs ready for the view's rays, by index; those that are needed and not put in a tree.
+    bodies: Vec<Option<BodyView<'a>>>,
 }
 
 /// The chords of one organ along the rays of a tile.
@@ -27,13 +32,25 @@ struct OrganChords {
     own: Vec<f64>,
 }
 
-/// What is noted on the way about how rays were answered.
+/// What is noted on the way.
 struct TileWork {
+    /// How rays were answered.
     found: Vec<Found>,
     queries: QueryCounts,
+    /// Each ray's organs and chords, if colour is wanted.
+    per_ray: Vec<Vec<(usize, Interval)>>,
+    spans: Spans,
 }
 
 impl TileWork {
+    /// A part of a ray in an organ.
+    fn note(&mut self, organ: usize, ray: usize, part: Interval, lengths: &mut [f64]) {
+        lengths[ray] += part.length();
+        if let Some(all) = self.per_ray.get_mut(ray) {
+            all.push((organ, part));
+        }
+    }
+
     /// The tree's answer. `None` if the ray is to be traced.
     fn ask(&mut self, grove: &Grove, tree: &RiTree<ChordLength>, ray: &Segment) -> Option<Option<Interval>> {
         self.queries.queries += 1;
@@ -52,26 +69,48 @@ impl TileWork {
 
 impl<'a, 's> TileTracer<'a, 's> {
     pub fn new(projector: &'a Projector<'s>, view: &'a View, view_index: u64) -> Self {
-        let appearances = projector.scene.organs.iter().map(|o| o.appearance).collect();
-        Self { projector, view, view_index, appearances }
+        let organs = &projector.scene.organs;
+        let grows = |organ: usize| projector.forest.as_ref().is_some_and(|forest| forest.grows(organ));
+        let ready = |(organ, it): (usize, &'a Organ)| {
+            let is_needed = projector.traced.binary_search(&organ).is_ok() && !grows(organ);
+            is_needed.then(|| it.body.view(view.rays(), projector.engine))
+        };
+        let bodies = organs.par_iter().enumerate().map(ready).collect();
+        let appearances = organs.iter().map(|o| o.appearance).collect();
+        Self { projector, view, view_index, appearances, bodies }
+    }
+
+    /// The engine of each organ that is ready.
+    pub fn engines(&self) -> Vec<Option<Engine>> {
+        self.bodies.iter().map(|body| body.as_ref().map(BodyView::engine)).collect()
     }
 
     pub fn trace(&self, region: Region) -> Tile {
         let frustum = self.view.frustum(region.columns.clone(), region.rows.clone());
         let touched = self.touched(&frustum);
-        let rays: Vec<Segment> = region.places().map(|(c, r)| self.view.segment(c, r)).collect();
-
         let wanted = self.projector.wanted;
-        let mut per_ray: Vec<Vec<(usize, Interval)>> =
-            vec![Vec::new(); if wanted.colour { rays.len() } else { 0 }];
-        let mut work = TileWork { found: Vec::new(), queries: QueryCounts::default() };
+        let mut work = TileWork {
+            found: Vec::new(),
+            queries: QueryCounts::default(),
+            per_ray: vec![Vec::new(); if wanted.colour { region.pixels() } else { 0 }],
+            spans: Spans::default(),
+        };
         let grove = self.projector.forest.as_ref().map(Forest::enter);
+        let mut rays = Vec::new();
         if grove.is_some() && !touched.is_empty() {
-            work.found = vec![Found::Nothing; rays.len()];
+            work.found = vec![Found::Nothing; region.pixels()];
+            rays = region.places().map(|(c, r)| self.view.segment(c, r)).collect();
         }
         let mut organs: Vec<OrganChords> = touched
             .iter()
-            .map(|&organ| self.chords(organ, &frustum, &rays, grove.as_ref(), &mut per_ray, &mut work))
+            .map(|&organ| {
+                let tree = grove.as_ref().and_then(|grove| Some((grove, grove.tree(organ)?)));
+                let lengths = match tree {
+                    Some((grove, tree)) => self.interpolate(organ, grove, tree, &rays, &mut work),
+                    None => self.trace_exactly(organ, &region, &mut work),
+                };
+                OrganChords { organ, own: lengths.clone(), lengths }
+            })
             .collect();
         drop(grove);
         self.projector.forest.iter().for_each(Forest::prune_if_full);
@@ -80,9 +119,10 @@ impl<'a, 's> TileTracer<'a, 's> {
 
         let (line_integral, transmission) =
             if wanted.attenuation { self.attenuate(&region, &organs) } else { Default::default() };
-        let colour = if wanted.colour && !organs.is_empty() { self.colour(&per_ray) } else { Vec::new() };
+        let colour =
+            if wanted.colour && !organs.is_empty() { self.colour(&work.per_ray) } else { Vec::new() };
         let lengths = if wanted.lengths { seen(&organs) } else { Vec::new() };
-        let TileWork { found, queries } = work;
+        let TileWork { found, queries, .. } = work;
         Tile { region, lengths, line_integral, transmission, colour, found, counts, queries }
     }
 
@@ -106,58 +146,64 @@ impl<'a, 's> TileTracer<'a, 's> {
         }
     }
 
-    fn chords(
+    /// The lengths of a tile's rays in one organ by its engine, mm.
+    fn trace_exactly(&self, organ: usize, region: &Region, work: &mut TileWork) -> Vec<f64> {
+        let mut lengths = vec![0.0; region.pixels()];
+        let Some(body) = &self.bodies[organ] else { return lengths };
+        if self.projector.forest.is_some() {
+            work.queries.traced_without_tree += region.pixels() as u64;
+        }
+        // The sums are the same with and without colour.
+        let sums = Lengths(&mut lengths);
+        if work.per_ray.is_empty() {
+            body.trace(region, &mut { sums });
+        } else {
+            body.trace(region, &mut (sums, &mut work.spans));
+            let per_ray = &mut work.per_ray;
+            work.spans.drain(|ray, part| per_ray[ray].push((organ, part)));
+        }
+        lengths
+    }
+
+    /// The lengths of a tile's rays in one organ by its tree, mm; what the tree does not know is traced.
+    fn interpolate(
         &self,
         organ: usize,
-        frustum: &Frustum,
+        grove: &Grove,
+        tree: &RiTree<ChordLength>,
         rays: &[Segment],
-        grove: Option<&Grove>,
-        per_ray: &mut [Vec<(usize, Interval)>],
         work: &mut TileWork,
-    ) -> OrganChords {
+    ) -> Vec<f64> {
         let body = &self.projector.scene.organs[organ].body;
-        let tree = grove.and_then(|grove| grove.tree(organ).map(|tree| (grove, tree)));
         let bounds = body.bounds();
-        // Where a tree answers the whole tile, nothing is narrowed.
-        let mut narrowed = None;
-        let mut parts = Vec::new();
-        let mut lengths = Vec::with_capacity(rays.len());
+        let mut lengths = vec![0.0; rays.len()];
+        let (mut open, mut open_rays) = (Vec::new(), Vec::new());
         for (i, ray) in rays.iter().enumerate() {
-            let asked = match tree {
-                None => {
-                    work.queries.traced_without_tree += u64::from(grove.is_some());
-                    None
-                }
-                Some(_) if !holds_box(ray, &bounds) => {
-                    work.queries.traced_source_or_target_inside += 1;
-                    None
-                }
-                Some((grove, tree)) => work.ask(grove, tree, ray),
+            let answer = if holds_box(ray, &bounds) {
+                work.ask(grove, tree, ray)
+            } else {
+                work.queries.traced_source_or_target_inside += 1;
+                None
             };
-            let found = match asked {
-                Some(chord) => {
-                    parts.clear();
-                    parts.extend(chord);
-                    Found::Interpolated
-                }
+            match answer {
                 None => {
-                    let narrow = || body.narrowed(|bounds| !frustum.misses(bounds));
-                    narrowed.get_or_insert_with(narrow).chords_of_segment(ray, &mut parts);
-                    Found::Traced
+                    open.push(i);
+                    open_rays.push(*ray);
+                    // A ray that is traced to find that it misses is on the map, one whose cell proves it is not.
+                    work.found[i] = Found::Traced;
                 }
-            };
-            // A ray that a cell proves to miss says nothing on the map; one that was traced to find so does.
-            if let Some(pixel) = work.found.get_mut(i).filter(|_| tree.is_some())
-                && (found == Found::Traced || !parts.is_empty())
-            {
-                *pixel = found.max(*pixel);
+                Some(None) => {}
+                Some(Some(chord)) => {
+                    work.found[i] = work.found[i].max(Found::Interpolated);
+                    work.note(organ, i, chord, &mut lengths);
+                }
             }
-            if let Some(all) = per_ray.get_mut(i) {
-                all.extend(parts.iter().map(|part| (organ, *part)));
-            }
-            lengths.push(parts.iter().map(Interval::length).sum::<f64>());
         }
-        OrganChords { organ, own: lengths.clone(), lengths }
+        body.trace(body.engine_for_rays(), 0, &open_rays, &mut work.spans);
+        let mut spans = std::mem::take(&mut work.spans);
+        spans.drain(|at, part| work.note(organ, open[at], part, &mut lengths));
+        work.spans = spans;
+        lengths
     }
 
     /// Own length = chord − chords of the direct children.
