@@ -1,0 +1,47 @@
+//! Times of several rounds, and what is said of them.
+
+/// Times of one task, by round.
+#[derive(Clone, Debug, Default)]
+pub struct Samples(pub Vec<f64>);
+
+impl Samples {
+    /// The median. NaN if there are none.
+    pub fn median(&self) -> f64 {
+        quantile(&self.0, 0.5)
+    }
+
+    /// Half the distance between the quartiles, as a share of the median.
+    pub fn spread(&self) -> f64 {
+        0.5 * (quantile(&self.0, 0.75) - quantile(&self.0, 0.25)) / self.median()
+    }
+
+    /// How many times as long as `other` it took: the median over the rounds both took part in, whose drift they share.
+    pub fn ratio_to(&self, other: &Self) -> f64 {
+        let ratios: Vec<f64> = self.0.iter().zip(&other.0).map(|(a, b)| a / b).collect();
+        quantile(&ratios, 0.5)
+    }
+}
+
+/// Linear between the sorted values.
+fn quantile(values: &[f64], share: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
+    let place = share * last as f64;
+    let (low, high) = (place.floor(), place.ceil());
+    let (a, b) = (sorted[low as usize], sorted[high as usize]);
+    a + (place - low) * (b - a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rounds_drift_is_in_no_ratio() {
+        let (a, b) = (Samples(vec![2.0, 20.0, 4.0]), Samples(vec![1.0, 10.0, 2.0]));
+        assert_eq!((a.median(), a.ratio_to(&b)), (4.0, 2.0));
+        assert_eq!(Samples(vec![1.0, 2.0, 3.0, 4.0, 5.0]).spread(), 1.0 / 3.0);
+        assert!(Samples::default().median().is_nan());
+    }
+}
