@@ -1,62 +1,46 @@
 //! This crate's engines as contestants.
 
-use chordfield::exact::bvh;
-use chordfield::exact::clip::ConvexClipper;
-use chordfield::geometry::{ClosedMesh, ConvexMesh};
+use std::hint::black_box;
+
+use chordfield::exact::{Body, Engine, Lengths};
+use chordfield::geometry::ClosedMesh;
 
 use crate::body::closed;
 use crate::rays::RaySet;
 use crate::{Contestant, Tracer};
 
-/// Half-space clipping.
-pub struct Clip {
-    clipper: ConvexClipper,
+/// A body, traced by one engine.
+pub struct OneEngine {
+    body: Body,
+    engine: Engine,
 }
 
-impl Clip {
-    /// Proves the body convex and lays out its planes.
-    pub fn new(surface: &ClosedMesh) -> Self {
-        let body = ConvexMesh::new(closed(surface.mesh().clone())).expect("ellipsoids are convex");
-        Self { clipper: ConvexClipper::new(&body) }
-    }
-}
-
-impl Contestant for Clip {
-    fn tracer<'a>(&'a self, rays: &'a RaySet) -> Option<Tracer<'a>> {
-        if matches!(rays, RaySet::Grid(_)) {
-            return None;
+impl OneEngine {
+    /// Proves the surface closed and, if it is, convex; and makes what the engine needs.
+    pub fn new(surface: &ClosedMesh, engine: Engine) -> Self {
+        let body = Body::new(closed(surface.mesh().clone()));
+        match engine {
+            Engine::Walk => drop(black_box(body.walker())),
+            Engine::Bvh => drop(black_box(body.bvh())),
+            Engine::Clip | Engine::Raster => {}
         }
-        Some(Box::new(|region, lengths| {
-            rays.each_of(region, |i, ray| {
-                let chord = self.clipper.chord(ray.line());
-                let within = chord.and_then(|chord| chord.intersection(&ray.reach()));
-                lengths[i] = within.map_or(0.0, |part| part.length());
-            });
-        }))
+        Self { body, engine }
     }
 }
 
-/// The box hierarchy and watertight crossings, one ray at a time.
-pub struct BoxHierarchy {
-    surface: ClosedMesh,
-}
-
-impl BoxHierarchy {
-    /// Proves the surface closed, which builds its hierarchy.
-    pub fn new(surface: &ClosedMesh) -> Self {
-        Self { surface: closed(surface.mesh().clone()) }
-    }
-}
-
-impl Contestant for BoxHierarchy {
+impl Contestant for OneEngine {
     fn tracer<'a>(&'a self, rays: &'a RaySet) -> Option<Tracer<'a>> {
-        Some(Box::new(|region, lengths| {
-            let mut parts = Vec::new();
-            rays.each_of(region, |i, ray| {
-                bvh::chords(&self.surface, ray.line(), &mut parts);
-                let within = parts.iter().filter_map(|part| part.intersection(&ray.reach()));
-                lengths[i] = within.map(|part| part.length()).sum();
-            });
-        }))
+        match rays {
+            RaySet::Grid(_) if self.engine == Engine::Clip => None,
+            RaySet::Grid(grid) => {
+                let view = self.body.view(grid, Some(self.engine));
+                Some(Box::new(move |region, lengths| view.trace(region, &mut Lengths(lengths))))
+            }
+            RaySet::Batch(_) if self.engine == Engine::Raster => None,
+            RaySet::Batch(rays) => Some(Box::new(move |region, lengths| {
+                let rays = &rays[region.columns.start as usize..region.columns.end as usize];
+                self.body.trace(self.engine, 0, rays, &mut Lengths(lengths));
+            })),
+        }
     }
 }

@@ -18,7 +18,9 @@ pub mod rivals;
 pub mod samples;
 pub mod view;
 
+use chordfield::exact::Engine;
 use chordfield::geometry::{ClosedMesh, Region};
+use engines::OneEngine;
 use rays::RaySet;
 
 /// Finds the lengths of a region's rays, mm, listed row by row, into a slice of zeros.
@@ -62,8 +64,10 @@ pub fn field(faces: usize) -> Vec<Entrant> {
     let rival =
         |name, build, mean_tolerance_mm| Entrant { name, build, mean_tolerance_mm, may_lose_rays: true };
     let mut entrants = vec![
-        ours("clip", |surface| Box::new(engines::Clip::new(surface))),
-        ours("bvh", |surface| Box::new(engines::BoxHierarchy::new(surface))),
+        ours("clip", |surface| Box::new(OneEngine::new(surface, Engine::Clip))),
+        ours("bvh", |surface| Box::new(OneEngine::new(surface, Engine::Bvh))),
+        ours("walk", |surface| Box::new(OneEngine::new(surface, Engine::Walk))),
+        ours("raster", |surface| Box::new(OneEngine::new(surface, Engine::Raster))),
         rival(YARDSTICK, |surface| Box::new(rivals::Obvhs::new(surface)), F32_MEAN_TOLERANCE_MM),
         rival("parry3d", |surface| Box::new(rivals::Parry::new(surface)), F64_MEAN_TOLERANCE_MM),
     ];

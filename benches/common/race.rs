@@ -73,8 +73,15 @@ impl Check {
     }
 }
 
-/// All lengths, from making ready to the last, on this thread or on the pool's.
-type Task<'a> = Box<dyn Fn(&mut [f64], Option<&rayon::ThreadPool>) + 'a>;
+/// All lengths, from making ready to the last; in parts, if that is to say so.
+type Task<'a> = Box<dyn Fn(&mut [f64], Share) + Sync + 'a>;
+
+/// Whether a task runs whole, or in parts on the threads of the pool it runs in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Share {
+    Whole,
+    Parts,
+}
 
 /// Races on one set of rays. `None` for contestants that do not take it.
 pub fn race(
@@ -102,20 +109,17 @@ pub fn race_of_organs(entrants: &[Entrant], organs: &Organs, rounds: usize) -> V
 fn task<'a>(contestant: &'a dyn Contestant, rays: &'a RaySet) -> Option<Task<'a>> {
     contestant.tracer(rays).is_some().then_some(())?;
     let (whole, parts) = (rays.whole(), rays.parts(PARTS));
-    Some(Box::new(move |lengths, pool| {
+    Some(Box::new(move |lengths, share| {
         let tracer = contestant.tracer(rays).expect("it took them before");
-        match pool {
-            None => {
+        match share {
+            Share::Whole => {
                 lengths.fill(0.0);
                 tracer(&whole, lengths);
             }
-            Some(pool) => {
-                let jobs = share_out(&parts, lengths);
-                pool.install(|| {
-                    jobs.into_par_iter().with_max_len(1).for_each(|(part, lengths)| {
-                        lengths.fill(0.0);
-                        tracer(part, lengths);
-                    });
+            Share::Parts => {
+                share_out(&parts, lengths).into_par_iter().with_max_len(1).for_each(|(part, lengths)| {
+                    lengths.fill(0.0);
+                    tracer(part, lengths);
                 });
             }
         }
@@ -132,19 +136,15 @@ fn task_of_organs<'a>(
         lengths.fill(0.0);
         contestants[i].tracer(rays).expect("the first took them")(region, lengths);
     };
-    Some(Box::new(move |lengths, pool| {
+    Some(Box::new(move |lengths, share| {
         let regions: Vec<Region> = organs.surfaces.iter().map(|s| organs.pixels_of(s)).collect();
-        let jobs = share_out(&regions, lengths).into_iter().enumerate();
-        match pool {
-            None => jobs.for_each(|(i, (region, lengths))| trace(i, region, lengths)),
-            Some(pool) => {
-                let jobs: Vec<_> = jobs.collect();
-                pool.install(|| {
-                    jobs.into_par_iter()
-                        .with_max_len(1)
-                        .for_each(|(i, (region, lengths))| trace(i, region, lengths));
-                });
-            }
+        let jobs: Vec<_> = share_out(&regions, lengths).into_iter().enumerate().collect();
+        match share {
+            Share::Whole => jobs.into_iter().for_each(|(i, (region, lengths))| trace(i, region, lengths)),
+            Share::Parts => jobs
+                .into_par_iter()
+                .with_max_len(1)
+                .for_each(|(i, (region, lengths))| trace(i, region, lengths)),
         }
     }))
 }
@@ -161,13 +161,15 @@ fn share_out<'a>(regions: &'a [Region], mut lengths: &'a mut [f64]) -> Vec<(&'a 
 }
 
 fn race_tasks(tasks: Vec<Option<Task<'_>>>, count: usize, rounds: usize) -> Vec<Option<Figures>> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("two threads");
+    let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+    let (one, two) = (pool(1), pool(2));
     let (mut lengths, mut judge) = (vec![0.0; count], None);
     // The check also warms caches and pages.
     let mut figures: Vec<Option<Figures>> = tasks
         .iter()
         .map(|task| {
-            task.as_ref()?(&mut lengths, Some(&pool));
+            let task = task.as_ref()?;
+            two.install(|| task(&mut lengths, Share::Parts));
             let check = Check::new(&lengths, judge.get_or_insert_with(|| lengths.clone()));
             Some(Figures { one_thread: Samples::default(), two_threads: Samples::default(), check })
         })
@@ -179,9 +181,13 @@ fn race_tasks(tasks: Vec<Option<Task<'_>>>, count: usize, rounds: usize) -> Vec<
             if so_far.len() >= LEAST_ROUNDS && so_far.iter().sum::<f64>() > PATIENCE.as_secs_f64() {
                 continue;
             }
-            for (pool, times) in [(None, &mut figures.one_thread), (Some(&pool), &mut figures.two_threads)] {
+            let runs = [
+                (&one, Share::Whole, &mut figures.one_thread),
+                (&two, Share::Parts, &mut figures.two_threads),
+            ];
+            for (pool, share, times) in runs {
                 let start = Instant::now();
-                task(&mut lengths, pool);
+                pool.install(|| task(&mut lengths, share));
                 times.0.push(start.elapsed().as_secs_f64());
             }
         }
