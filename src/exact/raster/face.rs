@@ -23,38 +23,40 @@ use crate::geometry::numeric::{DoubleDouble, gamma};
 /// Where an edge crosses rows. Of its ends, the first is the lower.
 #[derive(Clone, Copy)]
 pub struct Edge {
-    low: Place,
-    high: Place,
+    low: [f64; 2],
+    high: [f64; 2],
     slope: f64,
 }
 
 impl Edge {
     #[inline(always)]
-    pub fn new(low: Place, high: Place) -> Self {
-        Self { low, high, slope: (high.x - low.x) / (high.y - low.y) }
+    pub fn new(low: &Place, high: &Place) -> Self {
+        Self { low: [low.x, low.y], high: [high.x, high.y], slope: (high.x - low.x) / (high.y - low.y) }
     }
 
     /// The first column whose pixel is not left of the edge, in a row that the edge crosses. `tolerance` bounds the rounding
     /// of a crossing.
     #[inline(always)]
-    pub fn first_right(&self, row: i32, tolerance: f64) -> i32 {
-        let crossing = self.low.x + (f64::from(row) - self.low.y) * self.slope;
+    pub fn first_right(self, row: i32, tolerance: f64) -> i32 {
+        let crossing = self.low[0] + (f64::from(row) - self.low[1]) * self.slope;
         let (column, above) = round::nearest(crossing);
         if above.abs() <= tolerance {
-            return self.first_right_exact(row, column);
+            return first_right_exact(self.low, self.high, [column, row]);
         }
         column + i32::from(above > 0.0)
     }
+}
 
-    /// As above, if the crossing is too near to this column to tell.
-    #[cold]
-    #[inline(never)]
-    fn first_right_exact(&self, row: i32, column: i32) -> i32 {
-        let coord = |p: Place| Coord { x: p.x, y: p.y };
-        let centre = Coord { x: f64::from(column), y: f64::from(row) };
-        let is_left = orient2d(coord(self.low), coord(self.high), centre) > 0.0;
-        column + i32::from(is_left)
-    }
+/// As [`Edge::first_right`], if the crossing is too near to this column to tell.
+///
+/// It takes the ends one by one: an edge that is lent to a function has to be kept in memory by all others.
+#[cold]
+#[inline(never)]
+fn first_right_exact(low: [f64; 2], high: [f64; 2], [column, row]: [i32; 2]) -> i32 {
+    let coord = |[x, y]: [f64; 2]| Coord { x, y };
+    let centre = Coord { x: f64::from(column), y: f64::from(row) };
+    let is_left = orient2d(coord(low), coord(high), centre) > 0.0;
+    column + i32::from(is_left)
 }
 
 /// How the corners of a face lie, lowest first, and whether that order is as they are wound. Told by which of

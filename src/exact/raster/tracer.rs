@@ -152,20 +152,19 @@ impl<'v, 'a> Tracer<'v, 'a> {
     #[inline(always)]
     fn cover_by<const CONE: bool>(&mut self, face: u32, block: &Pixels) {
         let seen = self.seen;
-        let places = seen.corners[face as usize].map(|v| seen.places[v as usize]);
+        let corners = &seen.corners[face as usize];
+        let places = corners.map(|v| seen.places[v as usize]);
         let columns = places.map(|p| round::ceil(p.x));
         let rows = places.map(|p| round::ceil(p.y));
-        let (order, is_even) = order(rows);
-        let [first_row, turn, last_row] = order.map(|i| rows[i]);
+        let [first_row, turn, last_row] = sorted(rows);
         let (start, end) = (first_row.max(block.rows.start), last_row.min(block.rows.end));
-        let left = columns[0].min(columns[1]).min(columns[2]);
-        let right = columns[0].max(columns[1]).max(columns[2]);
+        let [left, _, right] = sorted(columns);
         if start >= end || left >= block.columns.end || right <= block.columns.start {
             return;
         }
-        let [low, mid, high] = order.map(|i| places[i]);
-        let long = Edge::new(low, high);
-        let short = [Edge::new(low, mid), Edge::new(mid, high)];
+        let (order, is_even) = order(rows);
+        let [low, mid, high] = order.map(|i| &seen.places[corners[i] as usize]);
+        let (long, below, above) = (Edge::new(low, high), Edge::new(low, mid), Edge::new(mid, high));
         let is_right_out = is_even != seen.projection.is_mirrored();
         let slot = self.block.faces.len() as u32;
         let block_spans = &mut self.block;
@@ -176,7 +175,8 @@ impl<'v, 'a> Tracer<'v, 'a> {
         let mut count = block_spans.span_count;
         for row in start..end {
             let by_long = long.first_right(row, seen.crossing_error);
-            let by_short = short[usize::from(row >= turn)].first_right(row, seen.crossing_error);
+            let short = if row < turn { below } else { above };
+            let by_short = short.first_right(row, seen.crossing_error);
             let start = by_long.min(by_short).max(block.columns.start);
             let end = by_long.max(by_short).min(block.columns.end);
             // Written in any case: that is faster than to ask whether there is something to write.
@@ -195,14 +195,21 @@ impl<'v, 'a> Tracer<'v, 'a> {
         let number = seen.numbers.as_ref().map_or(face, |n| n[face as usize]);
         let slope = match Slope::new(places, seen.care, limits) {
             Some(slope) => slope,
-            None => {
-                if seen.edge_on.is_none() && is_edge_on(places, seen.place_error) {
-                    pixels_along(places, number, seen.place_error, block, &mut block_spans.edge_on);
-                }
-                Slope::careful(places, limits)
-            }
+            None => self.look_closely(face, number, limits, block),
         };
-        block_spans.faces.push(Face { slope, number });
+        self.block.faces.push(Face { slope, number });
+    }
+
+    /// The slope of a face that needs care, and the pixels on it if it is edge-on.
+    #[cold]
+    #[inline(never)]
+    fn look_closely(&mut self, face: u32, number: u32, limits: [f64; 2], block: &Pixels) -> Slope {
+        let seen = self.seen;
+        let places = seen.corners[face as usize].map(|v| seen.places[v as usize]);
+        if seen.edge_on.is_none() && is_edge_on(places, seen.place_error) {
+            pixels_along(places, number, seen.place_error, block, &mut self.block.edge_on);
+        }
+        Slope::careful(places, limits)
     }
 
     /// The lengths of the block's rays: to the last bit those of their segments.
@@ -310,4 +317,11 @@ impl<'v, 'a> Tracer<'v, 'a> {
         }
         self.report::<CONE>(&rest, block, t_mm, record);
     }
+}
+
+/// Three numbers from the least to the greatest.
+#[inline(always)]
+fn sorted([a, b, c]: [i32; 3]) -> [i32; 3] {
+    let (low, high) = (a.min(b), a.max(b));
+    [low.min(c), low.max(high.min(c)), high.max(c)]
 }
