@@ -14,20 +14,23 @@ pub struct EdgeOn {
     pub face: u32,
 }
 
-/// Whether a face has no area but what moves of its corners by `place_error` can make: each of them changes it by
-/// half the extent times the move, eight times which leaves room for the rounding of the area itself.
+/// Whether moves of its corners by `place_error` may account for all of a face's area.
 #[inline(always)]
 pub fn is_edge_on([a, b, c]: [Place; 3], place_error: f64) -> bool {
     let (x1, y1, x2, y2) = (b.x - a.x, b.y - a.y, c.x - a.x, c.y - a.y);
-    let extent = x1.abs() + y1.abs() + x2.abs() + y2.abs();
+    let extent = x1.abs().max(x2.abs()) + y1.abs().max(y2.abs());
     // Written so that NaN is edge-on.
-    let has_area = (x1 * y2 - x2 * y1).abs() > 8.0 * place_error * extent;
+    let has_area = (x1 * y2 - x2 * y1).abs() > THICKNESS * place_error * extent;
     !has_area
 }
 
+/// The area of a triangle whose corners move, over its extents and the move: half of each extent for each corner, and the
+/// difference to the base counts twice. Three times as much leaves room for the rounding of the area itself.
+pub const THICKNESS: f64 = 12.0;
+
 /// Adds the pixels of `bounds` whose centres lie within rounding of an edge-on face.
 ///
-/// The face is no higher than 32 place errors over the longer of its extents, so that it is within as much of the line between its outermost corners
+/// The face is no higher than 24 place errors over the longer of its extents, so that it is within as much of the line between its outermost corners
 /// along that.
 #[cold]
 pub fn pixels_along(
@@ -67,4 +70,21 @@ pub fn pixels_along(
 fn extremes([a, b, c]: [Place; 3], key: impl Fn(Place) -> f64) -> [Place; 2] {
     let pick = |p: Place, q: Place, later: bool| if (key(p) <= key(q)) == later { q } else { p };
     [pick(pick(a, b, false), c, false), pick(pick(a, b, true), c, true)]
+}
+
+/// Sorts pixels for [`is_listed`], each once.
+pub fn sort(pixels: &mut Vec<EdgeOn>) {
+    pixels.sort_unstable();
+    pixels.dedup_by_key(|e| (e.row, e.column));
+}
+
+/// Whether a pixel is in a sorted list.
+pub fn is_listed(pixels: &[EdgeOn], row: i32, column: i32) -> bool {
+    pixels.binary_search_by_key(&(row, column), |e| (e.row, e.column)).is_ok()
+}
+
+/// The part of a sorted list in some rows.
+pub fn in_rows<'a>(pixels: &'a [EdgeOn], rows: &std::ops::Range<i32>) -> &'a [EdgeOn] {
+    let before = |row: i32| pixels.partition_point(|e| e.row < row);
+    &pixels[before(rows.start)..before(rows.end)]
 }

@@ -15,45 +15,48 @@
 
 use robust::{Coord, orient2d};
 
+use super::edge_on::THICKNESS;
 use super::projection::Place;
 use super::round;
-use crate::geometry::numeric::DoubleDouble;
+use crate::geometry::numeric::{DoubleDouble, gamma};
 
 /// Where an edge crosses rows. Of its ends, the first is the lower.
 #[derive(Clone, Copy)]
 pub struct Edge {
-    low: Place,
-    high: Place,
+    low: [f64; 2],
+    high: [f64; 2],
     slope: f64,
 }
 
 impl Edge {
     #[inline(always)]
-    pub fn new(low: Place, high: Place) -> Self {
-        Self { low, high, slope: (high.x - low.x) / (high.y - low.y) }
+    pub fn new(low: &Place, high: &Place) -> Self {
+        Self { low: [low.x, low.y], high: [high.x, high.y], slope: (high.x - low.x) / (high.y - low.y) }
     }
 
     /// The first column whose pixel is not left of the edge, in a row that the edge crosses. `tolerance` bounds the rounding
     /// of a crossing.
     #[inline(always)]
-    pub fn first_right(&self, row: i32, tolerance: f64) -> i32 {
-        let crossing = self.low.x + (f64::from(row) - self.low.y) * self.slope;
+    pub fn first_right(self, row: i32, tolerance: f64) -> i32 {
+        let crossing = self.low[0] + (f64::from(row) - self.low[1]) * self.slope;
         let (column, above) = round::nearest(crossing);
         if above.abs() <= tolerance {
-            return self.first_right_exact(row, column);
+            return first_right_exact(self.low, self.high, [column, row]);
         }
         column + i32::from(above > 0.0)
     }
+}
 
-    /// As above, if the crossing is too near to this column to tell.
-    #[cold]
-    #[inline(never)]
-    fn first_right_exact(&self, row: i32, column: i32) -> i32 {
-        let coord = |p: Place| Coord { x: p.x, y: p.y };
-        let centre = Coord { x: f64::from(column), y: f64::from(row) };
-        let is_left = orient2d(coord(self.low), coord(self.high), centre) > 0.0;
-        column + i32::from(is_left)
-    }
+/// As [`Edge::first_right`], if the crossing is too near to this column to tell.
+///
+/// It takes the ends one by one: an edge that is lent to a function has to be kept in memory by all others.
+#[cold]
+#[inline(never)]
+fn first_right_exact(low: [f64; 2], high: [f64; 2], [column, row]: [i32; 2]) -> i32 {
+    let coord = |[x, y]: [f64; 2]| Coord { x, y };
+    let centre = Coord { x: f64::from(column), y: f64::from(row) };
+    let is_left = orient2d(coord(low), coord(high), centre) > 0.0;
+    column + i32::from(is_left)
 }
 
 /// How the corners of a face lie, lowest first, and whether that order is as they are wound. Told by which of
@@ -86,33 +89,60 @@ pub struct Slope {
     highest: f64,
 }
 
-/// When a slope in f64 would not do, as factors of extents in columns or rows, and in depth.
+/// Which faces need a closer look: factors of their extents.
 #[derive(Clone, Copy, Debug)]
 pub struct Care {
-    pub per_pixel: f64,
-    pub per_depth: f64,
+    per_pixel: f64,
+    per_depth: f64,
+    of_thickness: f64,
+}
+
+impl Care {
+    /// With roundings of the corners of so much across and in depth.
+    ///
+    /// In f64 a slope errs, over the face's extents Eₓ, E_y, E_z, by γ₁₂ · Eₓ E_y E_z / |area| in depth, and by as much as
+    /// a move of γ₁₂ · Eₓ E_y max(Eₓ, E_y) / |area| in place. That may be no more than the corners' own error: more than that in
+    /// needles, and in faces seen almost edge-on.
+    pub fn new(place_error: f64, depth: f64) -> Self {
+        Self {
+            per_pixel: gamma(12) / place_error,
+            per_depth: 1.0 / depth,
+            of_thickness: THICKNESS * place_error,
+        }
+    }
 }
 
 impl Slope {
-    /// The slope of a face, and its depth kept within `limits`.
-    ///
-    /// In f64 the slope errs, over the face's extents Eₓ, E_y, E_z, by γ₁₂ · Eₓ E_y E_z / |area| in depth, and by as much as
-    /// a move of γ₁₂ · Eₓ E_y max(Eₓ, E_y) / |area| in place. Where that is more than the roundings of the corners (needles,
-    /// and faces seen almost edge-on) it is taken in double-double.
+    /// The slope of a face, and its depth kept within `limits`. `None` if that needs care, or if the face may be edge-on.
     #[inline(always)]
-    pub fn new([a, b, c]: [Place; 3], care: Care, limits: [f64; 2]) -> Self {
+    pub fn new([a, b, c]: [Place; 3], care: Care, limits: [f64; 2]) -> Option<Self> {
         let (x1, y1, z1) = (b.x - a.x, b.y - a.y, b.depth - a.depth);
         let (x2, y2, z2) = (c.x - a.x, c.y - a.y, c.depth - a.depth);
         let area = x1 * y2 - x2 * y1;
-        let max = |p: f64, q: f64| if p.abs() > q.abs() { p.abs() } else { q.abs() };
-        let (ex, ey, ez) = (max(x1, x2), max(y1, y2), max(z1, z2));
-        let (per_column, per_row) =
-            if ex * ey * (max(ex, ey) * care.per_pixel + ez * care.per_depth) > area.abs() {
-                careful_slopes([a, b, c])
-            } else {
-                let inverse = 1.0 / area;
-                ((z1 * y2 - z2 * y1) * inverse, (z2 * x1 - z1 * x2) * inverse)
-            };
+        let extent = |p: f64, q: f64| greater(p.abs(), q.abs());
+        let (ex, ey, ez) = (extent(x1, x2), extent(y1, y2), extent(z1, z2));
+        let least = ex * ey * (greater(ex, ey) * care.per_pixel + ez * care.per_depth)
+            + (ex + ey) * care.of_thickness;
+        let inverse = 1.0 / area;
+        let slopes = [(z1 * y2 - z2 * y1) * inverse, (z2 * x1 - z1 * x2) * inverse];
+        (area.abs() > least).then(|| Self::of([a, b, c], slopes, limits))
+    }
+
+    /// As above for any face, in double-double. The slopes of one without area are infinite or not numbers.
+    #[cold]
+    #[inline(never)]
+    pub fn careful([a, b, c]: [Place; 3], limits: [f64; 2]) -> Self {
+        let edge = |to: Place| {
+            [(to.x, a.x), (to.y, a.y), (to.depth, a.depth)].map(|(p, q)| DoubleDouble::difference(p, q))
+        };
+        let ([x1, y1, z1], [x2, y2, z2]) = (edge(b), edge(c));
+        let area = (x1 * y2 - x2 * y1).to_f64();
+        let slopes = [(z1 * y2 - z2 * y1).to_f64() / area, (z2 * x1 - z1 * x2).to_f64() / area];
+        Self::of([a, b, c], slopes, limits)
+    }
+
+    #[inline(always)]
+    fn of([a, b, c]: [Place; 3], [per_column, per_row]: [f64; 2], limits: [f64; 2]) -> Self {
         let lowest = lesser(a.depth, lesser(b.depth, c.depth));
         let highest = greater(a.depth, greater(b.depth, c.depth));
         let clamp = |depth: f64| greater(limits[0], lesser(depth, limits[1]));
@@ -131,17 +161,6 @@ impl Slope {
         let depth = of_row + self.per_column * (column - self.base.x);
         greater(lesser(depth, self.highest), self.lowest)
     }
-}
-
-#[cold]
-#[inline(never)]
-fn careful_slopes([a, b, c]: [Place; 3]) -> (f64, f64) {
-    let edge = |to: Place| {
-        [(to.x, a.x), (to.y, a.y), (to.depth, a.depth)].map(|(p, q)| DoubleDouble::difference(p, q))
-    };
-    let ([x1, y1, z1], [x2, y2, z2]) = (edge(b), edge(c));
-    let area = (x1 * y2 - x2 * y1).to_f64();
-    ((z1 * y2 - z2 * y1).to_f64() / area, (z2 * x1 - z1 * x2).to_f64() / area)
 }
 
 /// The lesser of two, the second if the first is not a number; one instruction, which `f64::min` is not.

@@ -245,7 +245,7 @@ fn coverage_is_that_of_the_exact_predicate() {
         let mut pierced = Pierced::default();
         view.trace(&grid.whole(), &mut pierced);
         for (ray, (column, row)) in grid.whole().places().enumerate() {
-            if is_listed(&seen.edge_on, row as i32, column as i32) {
+            if edge_on::is_listed(seen.edge_on.as_deref().unwrap_or_default(), row as i32, column as i32) {
                 continue;
             }
             let mut found: Vec<_> =
