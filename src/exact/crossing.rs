@@ -36,13 +36,14 @@ impl Crossing {
     /// Of the line of `shear` and a face of `surface`.
     #[inline(always)]
     pub fn of(surface: &ClosedMesh, face: u32, shear: &Shear) -> Self {
-        Self::of_triangle(&surface.mesh().triangle(face as usize).map(|corner| shear.apply(corner)))
+        let [a, b, c] = surface.mesh().triangle(face as usize);
+        Self::of_triangle(&[shear.apply(a), shear.apply(b), shear.apply(c)])
     }
 
     /// Of a triangle with these corners, counter-clockwise seen from outside.
     #[inline(always)]
     pub fn of_triangle(corners: &[Sheared; 3]) -> Self {
-        let [a, b, c] = corners.map(|v| v.across);
+        let [a, b, c] = [corners[0].across, corners[1].across, corners[2].across];
         let (of_c, c_is_sure) = area(a, b);
         let (of_a, a_is_sure) = area(b, c);
         let (of_b, b_is_sure) = area(c, a);
@@ -78,12 +79,12 @@ impl Crossing {
 /// Where the line passes through a face it covers, mm.
 #[inline(always)]
 fn place(corners: &[Sheared; 3], areas: [f64; 3]) -> f64 {
-    let along = corners.map(|v| v.along);
-    let weights = areas.map(f64::abs);
-    let total = weights[0] + weights[1] + weights[2];
-    let (low, high) = (along[0].min(along[1]).min(along[2]), along[0].max(along[1]).max(along[2]));
+    let [a, b, c] = [corners[0].along, corners[1].along, corners[2].along];
+    let [of_a, of_b, of_c] = [areas[0].abs(), areas[1].abs(), areas[2].abs()];
+    let total = of_a + of_b + of_c;
+    let (low, high) = (a.min(b).min(c), a.max(b).max(c));
     let t = if total > 0.0 {
-        (weights[0] * along[0] + weights[1] * along[1] + weights[2] * along[2]) / total
+        (of_a * a + of_b * b + of_c * c) / total
     } else {
         // Seen so nearly edge-on that the areas underflow: anywhere on the face is within rounding.
         0.5 * (low + high)

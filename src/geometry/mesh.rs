@@ -17,7 +17,8 @@ impl TriMesh {
     /// The three corners of a face.
     #[inline(always)]
     pub fn triangle(&self, face: usize) -> [DVec3; 3] {
-        self.faces[face].map(|v| self.vertices[v as usize])
+        let [a, b, c] = self.faces[face];
+        [self.vertices[a as usize], self.vertices[b as usize], self.vertices[c as usize]]
     }
 
     /// All triangles as corner positions.
