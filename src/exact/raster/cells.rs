@@ -10,7 +10,7 @@
 use std::ops::Range;
 
 /// Side of the finest cells, pixels.
-const FINEST: i32 = 16;
+const FINEST: i32 = 8;
 const FINEST_LOG2: u32 = FINEST.trailing_zeros();
 
 /// A rectangle of pixels, each side from the first to before the last.
@@ -21,6 +21,16 @@ pub struct Pixels {
 }
 
 impl Pixels {
+    /// From the least to before the greatest of some columns and rows.
+    pub fn between(places: impl Iterator<Item = [i32; 2]>) -> Self {
+        let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
+        for [x, y] in places {
+            low = [low[0].min(x), low[1].min(y)];
+            high = [high[0].max(x), high[1].max(y)];
+        }
+        Self { columns: low[0]..high[0], rows: low[1]..high[1] }
+    }
+
     /// Wider by so many pixels on every side.
     pub fn grown(&self, by: i32) -> Self {
         let grow = |r: &Range<i32>| r.start.saturating_sub(by)..r.end.saturating_add(by);
@@ -114,8 +124,8 @@ impl CellSorter {
 }
 
 impl Cells {
-    /// The faces that may be seen in a region, given from the first corner of the bounds, as runs of their list. The order of any two
-    /// faces is the same for all regions.
+    /// The faces that may be seen in a region, given from the first corner of the bounds, as runs of their list. The order
+    /// of any two faces is the same for all regions.
     pub fn near(&self, region: &Pixels) -> impl Iterator<Item = &[u32]> {
         let region = region.clone();
         let used = self.levels.iter().enumerate().filter(|(_, level)| level.is_used);

@@ -1,7 +1,7 @@
 //! Rays in the plane of a face: the face is seen as a line, and covers nothing, yet a closed body counts the length in it.
 //!
-//! Such rays are few, and are left to the engine that can tell ([`bvh`](crate::exact::bvh)). A pixel within rounding of a face
-//! that is edge-on within rounding is one of them; no more is claimed, as the answer is exact either way.
+//! Such rays are few, and are left to the engine that can tell ([`bvh`](crate::exact::bvh)). A pixel within rounding of a
+//! face that is edge-on within rounding is one of them; no more is claimed, as the answer is exact either way.
 
 use super::cells::Pixels;
 use super::projection::Place;
@@ -24,14 +24,15 @@ pub fn is_edge_on([a, b, c]: [Place; 3], place_error: f64) -> bool {
     !has_area
 }
 
-/// The area of a triangle whose corners move, over its extents and the move: half of each extent for each corner, and the
-/// difference to the base counts twice. Three times as much leaves room for the rounding of the area itself.
+/// By how much the area x₁y₂ − x₂y₁ may change as corners move by δ, in δ times both extents: each difference by 2δ, so the
+/// area by 4. Three times that leaves room for the rounding of the area itself.
 pub const THICKNESS: f64 = 12.0;
 
+/// How near to an edge-on face a pixel may be on it, in place errors: the face is no higher than 24 over the longer of its
+/// extents, and so within as much of the line between its outermost corners along that.
+pub const NEAR: f64 = 64.0;
+
 /// Adds the pixels of `bounds` whose centres lie within rounding of an edge-on face.
-///
-/// The face is no higher than 24 place errors over the longer of its extents, so that it is within as much of the line between its outermost corners
-/// along that.
 #[cold]
 pub fn pixels_along(
     corners: [Place; 3],
@@ -40,7 +41,7 @@ pub fn pixels_along(
     bounds: &Pixels,
     found: &mut Vec<EdgeOn>,
 ) {
-    let near = 64.0 * place_error;
+    let near = NEAR * place_error;
     let [low_x, high_x] = extremes(corners, |p| p.x);
     let [low_y, high_y] = extremes(corners, |p| p.y);
     let runs_along_rows = high_x.x - low_x.x >= high_y.y - low_y.y;

@@ -25,6 +25,9 @@ mod tracer;
 
 use std::borrow::Cow;
 
+use glam::DVec3;
+use rayon::prelude::*;
+
 use cells::{CellSorter, Cells, Pixels};
 use edge_on::{EdgeOn, is_edge_on, pixels_along};
 use face::Care;
@@ -55,7 +58,7 @@ enum Form<'a> {
     Unseen,
     /// So near to the source, or so large in the image, that rounding would be: each ray is traced by itself.
     RayByRay,
-    Seen(Seen<'a>),
+    Seen(Box<Seen<'a>>),
 }
 
 /// A surface in the image.
@@ -80,6 +83,9 @@ struct Seen<'a> {
 /// Nearer than this share of the way to the farthest point of a body, its nearest is cut off and faces are turned to
 /// keep the digits of their depth. Any number will do.
 const NEAR: f64 = 0.25;
+
+/// Fewer are projected sooner than another thread would have begun.
+const VERTICES_PER_JOB: usize = 4096;
 
 /// Places that err by more than this, in pixels, are not used. They usually err by 1e-11.
 const LARGEST_PLACE_ERROR: f64 = 1e-4;
@@ -143,7 +149,7 @@ impl<'a> Form<'a> {
         } else {
             Seen::cut(surface, grid, projection, &window)
         };
-        seen.map_or(Self::RayByRay, Self::Seen)
+        seen.map_or(Self::RayByRay, |seen| Self::Seen(Box::new(seen)))
     }
 }
 
@@ -167,8 +173,9 @@ impl<'a> Seen<'a> {
         window: &Pixels,
     ) -> Option<Self> {
         let extent = [sight.columns, sight.rows].as_flattened().iter().fold(0.0, |e: f64, x| e.max(x.abs()));
-        let places =
-            surface.mesh().vertices.iter().map(|&v| projection.place(projection.homogeneous(v))).collect();
+        let place = |&vertex: &DVec3| projection.place(projection.homogeneous(vertex));
+        let vertices = &surface.mesh().vertices;
+        let places = vertices.par_iter().with_min_len(VERTICES_PER_JOB).map(place).collect();
         let error = projection.place_error(&surface.bounds(), sight.shares[0], 1.0 + extent);
         // A crossing may not be off by more than one part in as many of its depth.
         let depth = if projection.is_cone() {
@@ -206,27 +213,21 @@ impl<'a> Seen<'a> {
         }
         let Shape { corners, numbers, places } = shape;
         let ceilings: Vec<[i32; 2]> = places.iter().map(|p| [round::ceil(p.x), round::ceil(p.y)]).collect();
-        let on_a_line = |x: f64| round::nearest(x).1.abs() <= 64.0 * errors.place;
+        let on_a_line = |x: f64| round::nearest(x).1.abs() <= 2.0 * edge_on::NEAR * errors.place;
         // A face that lies on a pixel has it in its box, unless a corner lies on a line of pixels; then all faces are looked
         // at, and not only those that may cover pixels when they are traced.
         let look_closely = places.iter().any(|p| on_a_line(p.x) || on_a_line(p.y));
-        let mut bounds = Pixels { columns: i32::MAX..i32::MIN, rows: i32::MAX..i32::MIN };
-        if source_is_inside {
-            bounds = window.clone();
+        let bounds = if source_is_inside {
+            window.clone()
         } else {
-            let mut add = |v: u32| {
-                let [x, y] = ceilings[v as usize];
-                bounds.columns = bounds.columns.start.min(x)..bounds.columns.end.max(x);
-                bounds.rows = bounds.rows.start.min(y)..bounds.rows.end.max(y);
-            };
-            match numbers {
+            let around = match numbers {
                 // Every vertex of a closed surface has a face.
-                None => (0..ceilings.len() as u32).for_each(&mut add),
-                Some(_) => corners.iter().flatten().for_each(|&v| add(v)),
-            }
+                None => Pixels::between(ceilings.iter().copied()),
+                Some(_) => Pixels::between(corners.iter().flatten().map(|&v| ceilings[v as usize])),
+            };
             // A pixel on the outline may lie on an edge-on face.
-            bounds = bounds.grown(1).intersection(window);
-        }
+            around.grown(1).intersection(window)
+        };
         let mut edge_on = Vec::new();
         let mut sorter = CellSorter::new(bounds.clone(), corners.len());
         for (i, face) in corners.iter().enumerate() {

@@ -32,7 +32,7 @@ use forest::Forest;
 use tile::TileTracer;
 
 /// Side of a tile, pixels: its rays' lengths for a few organs fit the second-level cache, and 1024² pixels make 1024 tiles.
-const TILE: u32 = 32;
+const TILE: u32 = 64;
 
 /// Which values a projection is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
