@@ -48,7 +48,10 @@ const LEAST_SLOPE: f32 = 1.0 / (1u64 << 40) as f32;
 /// Where a f64 keeps its exponent.
 const EXPONENT_BITS: u64 = 0x7ff << 52;
 
-/// With this margin no box and no triangle is held back.
+/// Beyond this margin, which is that of a line whose origin is some 10¹¹ bodies away, nothing is sifted: so that the line's
+/// point is never farther from the centre than 1 and a thousandth …
+const LARGEST_MARGIN: f32 = 1.0 / 1024.0;
+/// … and with this one no box and no triangle is held back.
 const EVERYTHING: f32 = 16.0;
 
 /// A line in a body's frame.
@@ -111,7 +114,8 @@ impl LocalLine {
     #[inline(always)]
     fn new(point: DVec3, dir: DVec3, margin: f32, shear: &Shear, reach_mm: [f64; 2]) -> Self {
         // Also where the origin is so far that its place in the frame is no number.
-        let (point, margin) = if margin < 1.0 { (point, margin) } else { (DVec3::ZERO, EVERYTHING) };
+        let (point, margin) =
+            if margin < LARGEST_MARGIN { (point, margin) } else { (DVec3::ZERO, EVERYTHING) };
         let (point, dir) = (point.to_array(), dir.to_array());
         let slope = dir.map(|d| {
             let d = d as f32;
