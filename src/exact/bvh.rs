@@ -7,7 +7,7 @@
 //! ```
 //!
 //! The sieves of f32 hold back only what the exact test would not count; what they let through is decided by that test
-//! alone, and it takes no crossing twice or loses one: see [`crossing`](super::crossing).
+//! alone, and it takes no crossing twice or loses one: see `exact::crossing`.
 
 mod build;
 mod line_box;
