@@ -104,11 +104,11 @@ fn images_are_the_same_bits_for_one_two_and_eight_threads() {
 
 #[test]
 fn what_no_output_asks_for_is_skipped_and_counted() {
-    let text = nested_balls(320).replace("bone_cortical", "vacuum");
+    let text = nested_balls(640).replace("bone_cortical", "vacuum");
     let scene = scene(&text).expect("a scene");
     let attenuation = Wanted { lengths: false, attenuation: true, colour: false };
     let counts = project(&scene, attenuation).counts();
-    assert_eq!(counts.rays, 320 * 320);
+    assert_eq!(counts.rays, 640 * 640);
     assert!(counts.rays_skipped_by_bounds > 0 && counts.organ_rays_skipped_by_bounds > 0);
     // The vacuum attenuates nothing, but it carves its chord out of the water around it.
     assert_eq!(counts.organ_rays_skipped_unneeded, 0);
@@ -118,7 +118,7 @@ fn what_no_output_asks_for_is_skipped_and_counted() {
 
     let apart = text.replace("inside = \"outer\"\n", "").replace("[10, 5, -8]", "[200, 0, 0]");
     let scene = common::scene(&apart).expect("a scene");
-    assert_eq!(project(&scene, attenuation).counts().organ_rays_skipped_unneeded, 320 * 320);
+    assert_eq!(project(&scene, attenuation).counts().organ_rays_skipped_unneeded, 640 * 640);
 }
 
 #[test]

@@ -43,13 +43,21 @@ impl Pixels {
     }
 }
 
+/// A face as it is kept with its cell: what comes first is read in order, not looked up all over the mesh.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CellFace {
+    /// In the surface.
+    pub number: u32,
+    pub corners: [u32; 3],
+}
+
 /// Faces, each in the cell of its box.
 #[derive(Clone, Debug)]
 pub struct Cells {
     levels: Vec<Level>,
     /// Where the faces of a cell begin in `faces`; one entry more than there are cells.
     starts: Vec<u32>,
-    faces: Vec<u32>,
+    faces: Vec<CellFace>,
 }
 
 #[derive(Clone, Debug)]
@@ -65,7 +73,8 @@ struct Level {
 pub struct CellSorter {
     levels: Vec<Level>,
     counts: Vec<u32>,
-    pending: Vec<(u32, u32)>,
+    /// Faces and their cells.
+    pending: Vec<(CellFace, u32)>,
     bounds: Pixels,
 }
 
@@ -90,7 +99,7 @@ impl CellSorter {
 
     /// Adds a face whose box of pixels, within the bounds, starts here and is so large.
     #[inline(always)]
-    pub fn add(&mut self, face: u32, [column, row]: [i32; 2], size: i32) {
+    pub fn add(&mut self, face: CellFace, [column, row]: [i32; 2], size: i32) {
         // The number of bits beyond those of the finest cell.
         let level = (32 - ((size - 1) >> FINEST_LOG2).leading_zeros()) as usize;
         let level = level.min(self.levels.len() - 1);
@@ -113,7 +122,7 @@ impl CellSorter {
             level.is_used = starts[last] > starts[level.first_cell];
         }
         let mut next = starts.clone();
-        let mut faces = vec![0; pending.len()];
+        let mut faces = vec![CellFace::default(); pending.len()];
         for (face, cell) in pending {
             let slot = &mut next[cell as usize];
             faces[*slot as usize] = face;
@@ -126,7 +135,7 @@ impl CellSorter {
 impl Cells {
     /// The faces that may be seen in a region, given from the first corner of the bounds, as runs of their list. The order
     /// of any two faces is the same for all regions.
-    pub fn near(&self, region: &Pixels) -> impl Iterator<Item = &[u32]> {
+    pub fn near(&self, region: &Pixels) -> impl Iterator<Item = &[CellFace]> {
         let region = region.clone();
         let used = self.levels.iter().enumerate().filter(|(_, level)| level.is_used);
         used.flat_map(move |(i, level)| {

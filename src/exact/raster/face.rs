@@ -113,9 +113,10 @@ impl Care {
 }
 
 impl Slope {
-    /// The slope of a face, and its depth kept within `limits`. `None` if that needs care, or if the face may be edge-on.
+    /// The slope of a face, and its depth kept within `limits`; and whether that is right: if not, it needs care, or the face
+    /// may be edge-on.
     #[inline(always)]
-    pub fn new([a, b, c]: [Place; 3], care: Care, limits: [f64; 2]) -> Option<Self> {
+    pub fn new([a, b, c]: [&Place; 3], care: Care, limits: [f64; 2]) -> (Self, bool) {
         let (x1, y1, z1) = (b.x - a.x, b.y - a.y, b.depth - a.depth);
         let (x2, y2, z2) = (c.x - a.x, c.y - a.y, c.depth - a.depth);
         let area = x1 * y2 - x2 * y1;
@@ -125,7 +126,7 @@ impl Slope {
             + (ex + ey) * care.of_thickness;
         let inverse = 1.0 / area;
         let slopes = [(z1 * y2 - z2 * y1) * inverse, (z2 * x1 - z1 * x2) * inverse];
-        (area.abs() > least).then(|| Self::of([a, b, c], slopes, limits))
+        (Self::of([a, b, c], slopes, limits), area.abs() > least)
     }
 
     /// As above for any face, in double-double. The slopes of one without area are infinite or not numbers.
@@ -138,15 +139,15 @@ impl Slope {
         let ([x1, y1, z1], [x2, y2, z2]) = (edge(b), edge(c));
         let area = (x1 * y2 - x2 * y1).to_f64();
         let slopes = [(z1 * y2 - z2 * y1).to_f64() / area, (z2 * x1 - z1 * x2).to_f64() / area];
-        Self::of([a, b, c], slopes, limits)
+        Self::of([&a, &b, &c], slopes, limits)
     }
 
     #[inline(always)]
-    fn of([a, b, c]: [Place; 3], [per_column, per_row]: [f64; 2], limits: [f64; 2]) -> Self {
+    fn of([a, b, c]: [&Place; 3], [per_column, per_row]: [f64; 2], limits: [f64; 2]) -> Self {
         let lowest = lesser(a.depth, lesser(b.depth, c.depth));
         let highest = greater(a.depth, greater(b.depth, c.depth));
         let clamp = |depth: f64| greater(limits[0], lesser(depth, limits[1]));
-        Self { base: a, per_column, per_row, lowest: clamp(lowest), highest: clamp(highest) }
+        Self { base: *a, per_column, per_row, lowest: clamp(lowest), highest: clamp(highest) }
     }
 
     /// The depth over a row, still to be kept within the face.

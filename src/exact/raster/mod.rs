@@ -28,7 +28,7 @@ use std::borrow::Cow;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use cells::{CellSorter, Cells, Pixels};
+use cells::{CellFace, CellSorter, Cells, Pixels};
 use edge_on::{EdgeOn, is_edge_on, pixels_along};
 use face::Care;
 use near::Cut;
@@ -49,26 +49,23 @@ use crate::geometry::{ClosedMesh, RayGrid, Region, Upstream};
 pub struct RasterView<'a> {
     surface: &'a ClosedMesh,
     grid: RayGrid,
-    form: Form<'a>,
+    form: Form,
 }
 
 #[derive(Clone, Debug)]
-enum Form<'a> {
+enum Form {
     /// No ray meets it.
     Unseen,
     /// So near to the source, or so large in the image, that rounding would be: each ray is traced by itself.
     RayByRay,
-    Seen(Box<Seen<'a>>),
+    Seen(Box<Seen>),
 }
 
 /// A surface in the image.
 #[derive(Clone, Debug)]
-struct Seen<'a> {
+struct Seen {
     projection: Projection,
     places: Vec<Place>,
-    corners: Cow<'a, [[u32; 3]]>,
-    /// The faces' numbers in the surface, if they are not those of `corners`.
-    numbers: Option<Vec<u32>>,
     /// The pixels that a face may cover.
     bounds: Pixels,
     cells: Cells,
@@ -126,8 +123,8 @@ impl<'a> RasterView<'a> {
     }
 }
 
-impl<'a> Form<'a> {
-    fn new(surface: &'a ClosedMesh, grid: &RayGrid) -> Self {
+impl Form {
+    fn new(surface: &ClosedMesh, grid: &RayGrid) -> Self {
         let (columns, rows) = grid.size();
         if f64::from(columns.max(rows)) > round::LARGEST {
             return Self::RayByRay;
@@ -164,14 +161,9 @@ fn is_off(sight: &Sight, window: &Pixels) -> bool {
     apart(sight.columns, &window.columns) || apart(sight.rows, &window.rows)
 }
 
-impl<'a> Seen<'a> {
+impl Seen {
     /// A surface all of whose points have a place.
-    fn plain(
-        surface: &'a ClosedMesh,
-        projection: Projection,
-        sight: &Sight,
-        window: &Pixels,
-    ) -> Option<Self> {
+    fn plain(surface: &ClosedMesh, projection: Projection, sight: &Sight, window: &Pixels) -> Option<Self> {
         let extent = [sight.columns, sight.rows].as_flattened().iter().fold(0.0, |e: f64, x| e.max(x.abs()));
         let place = |&vertex: &DVec3| projection.place(projection.homogeneous(vertex));
         let vertices = &surface.mesh().vertices;
@@ -187,7 +179,7 @@ impl<'a> Seen<'a> {
         Self::new(projection, shape, Errors { place: error, extent: 1.0 + extent, depth }, false, window)
     }
 
-    fn cut(surface: &'a ClosedMesh, grid: &RayGrid, projection: Projection, window: &Pixels) -> Option<Self> {
+    fn cut(surface: &ClosedMesh, grid: &RayGrid, projection: Projection, window: &Pixels) -> Option<Self> {
         let Upstream::Source(source) = grid.upstream() else { return None };
         let Cut { places, corners, numbers, source_is_inside, share } =
             Cut::new(surface, grid, &projection, source)?;
@@ -201,7 +193,7 @@ impl<'a> Seen<'a> {
 
     fn new(
         projection: Projection,
-        shape: Shape<'a>,
+        shape: Shape,
         errors: Errors,
         source_is_inside: bool,
         window: &Pixels,
@@ -231,10 +223,10 @@ impl<'a> Seen<'a> {
         let mut edge_on = Vec::new();
         let mut sorter = CellSorter::new(bounds.clone(), corners.len());
         for (i, face) in corners.iter().enumerate() {
+            let number = numbers.as_ref().map_or(i as u32, |n| n[i]);
             if look_closely {
                 let triangle = face.map(|v| places[v as usize]);
                 if is_edge_on(triangle, errors.place) {
-                    let number = numbers.as_ref().map_or(i as u32, |n| n[i]);
                     pixels_along(triangle, number, errors.place, window, &mut edge_on);
                 }
             }
@@ -244,15 +236,17 @@ impl<'a> Seen<'a> {
             let start = [low[0].max(bounds.columns.start), low[1].max(bounds.rows.start)];
             let end = [high[0].min(bounds.columns.end), high[1].min(bounds.rows.end)];
             if start[0] < end[0] && start[1] < end[1] {
-                sorter.add(i as u32, start, (end[0] - start[0]).max(end[1] - start[1]));
+                sorter.add(
+                    CellFace { number, corners: *face },
+                    start,
+                    (end[0] - start[0]).max(end[1] - start[1]),
+                );
             }
         }
         edge_on::sort(&mut edge_on);
         Some(Self {
             projection,
             places,
-            corners,
-            numbers,
             bounds,
             cells: sorter.sort(),
             edge_on: look_closely.then_some(edge_on),
@@ -265,8 +259,10 @@ impl<'a> Seen<'a> {
     }
 }
 
+/// A surface as it is seen.
 struct Shape<'a> {
     corners: Cow<'a, [[u32; 3]]>,
+    /// The faces' numbers in the surface, if they are not those of `corners`.
     numbers: Option<Vec<u32>>,
     places: Vec<Place>,
 }

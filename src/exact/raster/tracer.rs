@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use super::cells::Pixels;
+use super::cells::{CellFace, Pixels};
 use super::edge_on::{self, EdgeOn, is_edge_on, is_listed, pixels_along};
 use super::face::{Edge, Slope, order};
 use super::{RasterView, Seen, round};
@@ -22,7 +22,7 @@ const RUN: usize = 64;
 /// Traces a region.
 pub struct Tracer<'v, 'a> {
     view: &'v RasterView<'a>,
-    seen: &'v Seen<'a>,
+    seen: &'v Seen,
     asked: Pixels,
     block: Block,
 }
@@ -71,7 +71,7 @@ struct Span {
 }
 
 impl<'v, 'a> Tracer<'v, 'a> {
-    pub fn new(view: &'v RasterView<'a>, seen: &'v Seen<'a>, region: &Region) -> Self {
+    pub fn new(view: &'v RasterView<'a>, seen: &'v Seen, region: &Region) -> Self {
         // A grid of more than 2³⁰ columns or rows is not seen.
         let pixels = |range: &Range<u32>| range.start as i32..range.end as i32;
         let asked = Pixels { columns: pixels(&region.columns), rows: pixels(&region.rows) };
@@ -143,19 +143,19 @@ impl<'v, 'a> Tracer<'v, 'a> {
             rows: within(&block.rows, first.rows.start),
         };
         for faces in seen.cells.near(&region) {
-            for &face in faces {
+            for face in faces {
                 self.cover_by::<CONE>(face, block);
             }
         }
     }
 
     #[inline(always)]
-    fn cover_by<const CONE: bool>(&mut self, face: u32, block: &Pixels) {
+    fn cover_by<const CONE: bool>(&mut self, face: &CellFace, block: &Pixels) {
         let seen = self.seen;
-        let corners = &seen.corners[face as usize];
-        let places = corners.map(|v| seen.places[v as usize]);
-        let columns = places.map(|p| round::ceil(p.x));
-        let rows = places.map(|p| round::ceil(p.y));
+        let [a, b, c] = face.corners.map(|v| v as usize);
+        let (a, b, c) = (&seen.places[a], &seen.places[b], &seen.places[c]);
+        let columns = [round::ceil(a.x), round::ceil(b.x), round::ceil(c.x)];
+        let rows = [round::ceil(a.y), round::ceil(b.y), round::ceil(c.y)];
         let [first_row, turn, last_row] = sorted(rows);
         let (start, end) = (first_row.max(block.rows.start), last_row.min(block.rows.end));
         let [left, _, right] = sorted(columns);
@@ -163,7 +163,7 @@ impl<'v, 'a> Tracer<'v, 'a> {
             return;
         }
         let (order, is_even) = order(rows);
-        let [low, mid, high] = order.map(|i| &seen.places[corners[i] as usize]);
+        let [low, mid, high] = order.map(|i| &seen.places[face.corners[i] as usize]);
         let (long, below, above) = (Edge::new(low, high), Edge::new(low, mid), Edge::new(mid, high));
         let is_right_out = is_even != seen.projection.is_mirrored();
         let slot = self.block.faces.len() as u32;
@@ -192,24 +192,25 @@ impl<'v, 'a> Tracer<'v, 'a> {
         block_spans.span_count = count;
         // Of the whole way, from the source to the pixel: shares from 0 to 1.
         let limits = if CONE { [1.0, f64::INFINITY] } else { [0.0, 1.0] };
-        let number = seen.numbers.as_ref().map_or(face, |n| n[face as usize]);
-        let slope = match Slope::new(places, seen.care, limits) {
-            Some(slope) => slope,
-            None => self.look_closely(face, number, limits, block),
-        };
-        self.block.faces.push(Face { slope, number });
+        let (slope, is_sure) = Slope::new([a, b, c], seen.care, limits);
+        self.block.faces.push(Face { slope, number: face.number });
+        if !is_sure {
+            self.look_closely(face, limits, block);
+        }
     }
 
-    /// The slope of a face that needs care, and the pixels on it if it is edge-on.
+    /// Corrects the slope of the last face, which needs care, and lists the pixels on it if it is edge-on.
     #[cold]
     #[inline(never)]
-    fn look_closely(&mut self, face: u32, number: u32, limits: [f64; 2], block: &Pixels) -> Slope {
+    fn look_closely(&mut self, face: &CellFace, limits: [f64; 2], block: &Pixels) {
         let seen = self.seen;
-        let places = seen.corners[face as usize].map(|v| seen.places[v as usize]);
+        let places = face.corners.map(|v| seen.places[v as usize]);
         if seen.edge_on.is_none() && is_edge_on(places, seen.place_error) {
-            pixels_along(places, number, seen.place_error, block, &mut self.block.edge_on);
+            pixels_along(places, face.number, seen.place_error, block, &mut self.block.edge_on);
         }
-        Slope::careful(places, limits)
+        if let Some(last) = self.block.faces.last_mut() {
+            last.slope = Slope::careful(places, limits);
+        }
     }
 
     /// The lengths of the block's rays: to the last bit those of their segments.

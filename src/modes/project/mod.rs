@@ -1,8 +1,8 @@
 //! Projection images: each organ's own length, attenuation and colour for every pixel of a view.
 //!
 //! ```text
-//!             ┌──┬──┬──┐   tiles of 32 × 32 pixels, on all cores
-//!   source ──◁├──┼──┼──┤   tile's frustum misses an organ's box ─► organ skipped for 1024 rays
+//!             ┌──┬──┬──┐   tiles of 64 × 64 pixels, on all cores
+//!   source ──◁├──┼──┼──┤   tile's frustum misses an organ's box ─► organ skipped for 4096 rays
 //!             └──┴──┴──┘   otherwise: chords of all its rays ─► own lengths ─► p, T · stretches ─► colour
 //! ```
 //!
@@ -31,7 +31,7 @@ pub use spot_check::SampledError;
 use forest::Forest;
 use tile::TileTracer;
 
-/// Side of a tile, pixels: its rays' lengths for a few organs fit the second-level cache, and 1024² pixels make 1024 tiles.
+/// Side of a tile, pixels: its rays' lengths for a few organs fit the second-level cache, and 1024² pixels make 256 tiles.
 const TILE: u32 = 64;
 
 /// Which values a projection is asked for.
