@@ -27,3 +27,6 @@ pub mod walk;
 pub use body::Body;
 pub use engine::{BodyView, Engine};
 pub use record::{Lengths, Pierce, Pierced, Record, Spans, Way};
+
+#[cfg(test)]
+mod tests;
