@@ -142,3 +142,33 @@ fn an_engine_that_does_not_serve_gives_way_to_one_that_does() {
         assert!(body.view(&grid, Some(engine)).engine().serves(&body));
     }
 }
+
+#[test]
+fn a_ray_that_lies_in_a_face_but_for_rounding_is_no_longer_than_the_face() {
+    // The ray's direction is no f64: it lies in the roof's plane but for the last digits, from the ridge to the eaves.
+    // How much of that counts is rounding's to say, but no more than all.
+    let points = [
+        [1, -2, 3],
+        [-2, 4, 2],
+        [-2, -4, 2],
+        [-1, -4, 2],
+        [3, 2, 1],
+        [-3, 3, 0],
+        [3, 4, 0],
+        [-4, 2, -3],
+        [-2, 0, -2],
+    ];
+    let hull = convex_hull(&points.map(|p| DVec3::from(p.map(f64::from)))).expect("a hull");
+    let body = Body::new(ClosedMesh::new(hull).expect("closed").0);
+    let grid = RayGrid::new(
+        Upstream::Source(DVec3::new(1.0, 16.0, 3.0)),
+        DVec3::new(-5.0, -20.0, 1.0),
+        [2.0 * DVec3::Z, -2.0 * DVec3::X],
+        [1, 1],
+    )
+    .expect("a grid");
+    for engine in ENGINES {
+        let length = lengths(&body, &grid, engine)[0];
+        assert!(length < 0.25 * 334f64.sqrt() + 1e-12, "{engine:?}: {length}");
+    }
+}

@@ -27,6 +27,11 @@ impl DoubleDouble {
         Self::exact_sum(a, -b)
     }
 
+    /// `a · b` without error, unless it underflows.
+    pub fn product(a: f64, b: f64) -> Self {
+        Self::exact_product(a, b)
+    }
+
     /// The nearest f64.
     pub fn to_f64(self) -> f64 {
         self.high
