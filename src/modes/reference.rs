@@ -119,7 +119,8 @@ impl RoundingFigures {
                 max_mm = error_mm.abs();
                 figures.worst_ray = Some(ray);
             }
-            if let (Some(of_length), Some(of_distance)) = (rounding.ulps_of_length, rounding.ulps_of_distance) {
+            if let (Some(of_length), Some(of_distance)) = (rounding.ulps_of_length, rounding.ulps_of_distance)
+            {
                 with_chord += 1;
                 figures.mean_ulps += of_length;
                 figures.max_ulps = figures.max_ulps.max(of_length);
@@ -153,8 +154,9 @@ mod tests {
     fn rays_through(body: &Body, seed: u64, rays: usize) -> Vec<Segment> {
         let bounds = body.bounds();
         let mut rng = rand_pcg::Pcg64::seed_from_u64(seed);
-        let mut point =
-            || bounds.centre() + 0.3 * bounds.size() * DVec3::from([0; 3].map(|_| rng.random_range(-1.0..1.0)));
+        let mut point = || {
+            bounds.centre() + 0.3 * bounds.size() * DVec3::from([0; 3].map(|_| rng.random_range(-1.0..1.0)))
+        };
         let across = |(a, b): (DVec3, DVec3)| Segment::between(a + 5.0 * (a - b), b + 5.0 * (b - a));
         (0..rays).filter_map(|_| across((point(), point()))).collect()
     }
