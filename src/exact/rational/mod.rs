@@ -8,19 +8,15 @@
 //! Two surfaces are to be kept apart. [`of_planes`] is the chord of the planes that clipping computes with: a corner of each
 //! face and its normal, rounded to f64. [`of_triangles`] is that of the surface itself: the flat triangles between the
 //! vertices, convex or not. They differ by the rounding of the normals.
-//!
-//! Some ten to a hundred microseconds a ray, nearly all of it in reducing fractions.
 
+mod dyadic;
 mod planes;
 #[cfg(test)]
 mod tests;
 mod triangles;
 
-use glam::DVec3;
-use num_rational::BigRational;
-use num_traits::{ToPrimitive, Zero};
-
 use crate::geometry::{Interval, Line};
+use dyadic::{Quotient, Vector};
 
 pub use planes::of_planes;
 pub use triangles::of_triangles;
@@ -32,7 +28,7 @@ const UNDERFLOW: f64 = 1e-300;
 /// for 1 mm as everywhere and is so within two units in the last place.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RationalChord {
-    parts: Vec<[BigRational; 2]>,
+    parts: Vec<[Quotient; 2]>,
 }
 
 /// How far a length in f64 is from the exact one.
@@ -48,14 +44,14 @@ pub struct Rounding {
 }
 
 impl RationalChord {
-    /// The parts from `start` to `end`.
-    pub fn parts(&self) -> &[[BigRational; 2]] {
-        &self.parts
+    /// Where its parts begin and end, each rounded to f64, mm.
+    pub fn ends_mm(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
+        self.parts.iter().map(|part| [part[0].nearest(), part[1].nearest()])
     }
 
     /// What of it lies within `reach`, whose ends are taken as they are.
     pub fn within(mut self, reach: &Interval) -> Self {
-        let end = |t: f64| t.is_finite().then(|| exact(t));
+        let end = |t: f64| t.is_finite().then(|| Quotient::of(t));
         let (least, most) = (end(reach.start()), end(reach.end()));
         for [start, end] in &mut self.parts {
             if let Some(least) = least.as_ref().filter(|least| *least > start) {
@@ -69,35 +65,32 @@ impl RationalChord {
         self
     }
 
-    /// Its length.
-    pub fn length(&self) -> BigRational {
-        self.parts.iter().map(|[start, end]| end - start).sum()
+    fn length(&self) -> Quotient {
+        self.parts.iter().fold(Quotient::of(0.0), |sum, [start, end]| sum.plus(&end.minus(start)))
     }
 
-    /// Its length in f64, mm.
+    /// Its length, rounded once to f64, mm.
     pub fn length_mm(&self) -> f64 {
-        nearest(&self.length())
+        self.length().nearest()
     }
 
     /// How far `length_mm`, which must be finite, is from its length.
     pub fn rounding_of(&self, length_mm: f64) -> Rounding {
         let length = self.length();
-        let error = exact(length_mm) - &length;
-        let error_mm = nearest(&error);
-        let ends = self.parts.iter().flatten().map(|t| nearest(t).abs());
-        let farthest = ends.fold(0.0, f64::max);
+        let error_mm = Quotient::of(length_mm).minus(&length).nearest();
+        let farthest = self.ends_mm().flatten().map(f64::abs).fold(0.0, f64::max);
         Rounding {
             error_mm,
-            ulps_of_length: in_ulps(error_mm, nearest(&length)),
+            ulps_of_length: in_ulps(error_mm, length.nearest()),
             ulps_of_distance: in_ulps(error_mm, farthest),
         }
     }
 
     /// These parts in order, those of no length left out; where two overlap or touch, one.
-    fn joined(mut parts: Vec<[BigRational; 2]>) -> Self {
+    fn joined(mut parts: Vec<[Quotient; 2]>) -> Self {
         parts.retain(|[start, end]| start < end);
         parts.sort_unstable();
-        let mut joined: Vec<[BigRational; 2]> = Vec::new();
+        let mut joined: Vec<[Quotient; 2]> = Vec::new();
         for [start, end] in parts {
             match joined.last_mut() {
                 Some(last) if start <= last[1] => {
@@ -117,34 +110,6 @@ fn in_ulps(error: f64, of: f64) -> Option<f64> {
     (of > 0.0 && of.is_finite()).then(|| error.abs() / (of.next_up() - of))
 }
 
-/// A number of a proved body or line, as it is.
-fn exact(x: f64) -> BigRational {
-    BigRational::from_float(x).expect("bodies and lines are finite by construction")
-}
-
-/// The f64 next to a rational; 0 if that is beyond f64, which no length of finite numbers is.
-fn nearest(x: &BigRational) -> f64 {
-    x.to_f64().unwrap_or(0.0)
-}
-
-/// A vector without rounding.
-#[derive(Clone, Debug)]
-struct Vector([BigRational; 3]);
-
-impl Vector {
-    fn of(v: DVec3) -> Self {
-        Self(v.to_array().map(exact))
-    }
-
-    fn minus(&self, other: &Self) -> Self {
-        Self([0, 1, 2].map(|i| &self.0[i] - &other.0[i]))
-    }
-
-    fn dot(&self, other: &Self) -> BigRational {
-        self.0.iter().zip(&other.0).map(|(a, b)| a * b).sum()
-    }
-}
-
 /// A line without rounding.
 struct RationalLine {
     origin: Vector,
@@ -154,14 +119,5 @@ struct RationalLine {
 impl RationalLine {
     fn of(line: &Line) -> Self {
         Self { origin: Vector::of(line.origin()), dir: Vector::of(line.dir()) }
-    }
-}
-
-/// The sign: −1, 0 or 1.
-fn sign(x: &BigRational) -> i32 {
-    match x.cmp(&BigRational::zero()) {
-        std::cmp::Ordering::Less => -1,
-        std::cmp::Ordering::Equal => 0,
-        std::cmp::Ordering::Greater => 1,
     }
 }

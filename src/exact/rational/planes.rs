@@ -12,9 +12,8 @@
 //! The plane that decides crosses last of all, so not before any other's lower end, so not before E: its own upper end is
 //! not below E, and it stays. What goes crosses before the one that decides. Leaving planes likewise, from the other side.
 
-use num_rational::BigRational;
-
-use super::{RationalChord, RationalLine, UNDERFLOW, Vector, sign};
+use super::dyadic::{Quotient, Vector};
+use super::{RationalChord, RationalLine, UNDERFLOW};
 use crate::geometry::numeric::gamma;
 use crate::geometry::{ConvexMesh, Line, Plane};
 
@@ -30,16 +29,16 @@ pub fn of_planes(body: &ConvexMesh, line: &Line) -> RationalChord {
 /// Cyrus–Beck in rationals.
 pub(super) fn clip(planes: &[&Plane], line: &Line) -> RationalChord {
     let line = RationalLine::of(line);
-    let (mut enter, mut leave): (Option<BigRational>, Option<BigRational>) = (None, None);
+    let (mut enter, mut leave): (Option<Quotient>, Option<Quotient>) = (None, None);
     for plane in planes {
         let normal = Vector::of(plane.normal);
         let height = normal.dot(&Vector::of(plane.point).minus(&line.origin));
         let slope = normal.dot(&line.dir);
-        match sign(&slope) {
-            0 if sign(&height) < 0 => return RationalChord::default(),
+        match slope.sign() {
+            0 if height.sign() < 0 => return RationalChord::default(),
             0 => {}
             side => {
-                let t = height / slope;
+                let t = Quotient::new(height, &slope);
                 let (sofar, later) = if side < 0 { (&mut enter, true) } else { (&mut leave, false) };
                 if sofar.as_ref().is_none_or(|sofar| (t > *sofar) == later) {
                     *sofar = Some(t);

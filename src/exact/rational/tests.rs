@@ -1,3 +1,4 @@
+use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -45,9 +46,9 @@ fn aimed(surface: &ClosedMesh, seed: u64, rays: usize) -> Vec<Segment> {
 #[test]
 fn a_cube_is_as_long_as_its_side_without_rounding() {
     let cube = convex(cube(2.0));
-    let two = exact(2.0);
+    let two = Quotient::of(2.0);
     for (y, z, length) in
-        [(0.3, 0.4, &two), (1.0, 0.2, &two), (1.0, -1.0, &two), (1.0 + f64::EPSILON, 0.2, &exact(0.0))]
+        [(0.3, 0.4, &two), (1.0, 0.2, &two), (1.0, -1.0, &two), (1.0 + f64::EPSILON, 0.2, &Quotient::of(0.0))]
     {
         for from in [-5.0, 5.0] {
             let ray = line(DVec3::new(from, y, z), DVec3::X * -from);
@@ -63,7 +64,7 @@ fn a_cavity_parts_the_chord_and_a_reach_cuts_it() {
     shell.append(&inside_out(block([2.0; 3], [5.0; 3])));
     let ray = line(DVec3::new(-1.0, 3.0, 3.5), DVec3::X);
     let chord = of_triangles(&closed(shell), &ray);
-    let parts = |chord: &RationalChord| chord.parts().iter().flatten().map(nearest).collect::<Vec<_>>();
+    let parts = |chord: &RationalChord| chord.ends_mm().flatten().collect::<Vec<_>>();
     assert_eq!(parts(&chord), [1.0, 3.0, 6.0, 9.0]);
     let reach = Interval::new(0.0, 7.5).expect("ordered");
     assert_eq!(parts(&chord.clone().within(&reach)), [1.0, 3.0, 6.0, 7.5]);
