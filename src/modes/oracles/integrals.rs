@@ -11,10 +11,11 @@
 
 use std::f64::consts::PI;
 
-use super::Oracles;
 use super::beams::{Lattice, cone, isotropic, parallel};
 use super::verdict::{Claim, Verdict};
+use super::{Oracles, Rays};
 use crate::exact::Body;
+use crate::geometry::Interval;
 use crate::geometry::numeric::gamma;
 
 const PARALLEL: Claim = Claim {
@@ -59,17 +60,14 @@ fn parallel_volume(oracles: &Oracles, subject: &str, body: &Body) -> Verdict {
     let both_ways = directions.into_iter().flat_map(|along| [along, -along]);
     let mut worst = Deviation::NONE;
     for along in both_ways {
-        let lattices = (0..LATTICES).filter_map(|_| parallel(body, along, oracles.size.pixels, &mut random));
-        let sum = |lattice: &Lattice| {
-            let lengths = oracles.witness.lengths(body, &lattice.rays);
+        let (lattices, sets) = lattices(|| parallel(body, along, oracles.size.pixels, &mut random));
+        let lengths = oracles.witness.lengths_of_each(body, &sets);
+        let sums = lattices.iter().zip(&lengths).map(|(lattice, lengths)| {
             let met = lengths.iter().filter(|l| **l != 0.0).count();
-            [
-                lengths.iter().sum::<f64>() * lattice.cell_mm2,
-                met as f64 * lattice.cell_mm2,
-                lengths.len() as f64,
-            ]
-        };
-        worst = worst.or(Deviation::of(oracles, body, lattices.map(|lattice| sum(&lattice))));
+            let (total, rays) = (lengths.iter().sum::<f64>(), lengths.len() as f64);
+            [total * lattice.cell_mm2, met as f64 * lattice.cell_mm2, rays]
+        });
+        worst = worst.or(Deviation::of(oracles, body, sums));
     }
     worst.verdict(PARALLEL, subject)
 }
@@ -79,19 +77,27 @@ fn cone_volume(oracles: &Oracles, subject: &str, body: &Body) -> Verdict {
     let mut worst = Deviation::NONE;
     for _ in 0..oracles.size.directions {
         let along = random.direction();
-        let lattices = (0..LATTICES).filter_map(|_| cone(body, along, oracles.size.pixels, &mut random));
-        worst =
-            worst.or(Deviation::of(oracles, body, lattices.map(|lattice| cone_sum(oracles, body, &lattice))));
+        let (lattices, sets) = lattices(|| cone(body, along, oracles.size.pixels, &mut random));
+        let parts = oracles.witness.parts_of_each(body, &sets);
+        let sums = lattices.iter().zip(&parts).map(|(lattice, parts)| cone_sum(lattice, parts));
+        worst = worst.or(Deviation::of(oracles, body, sums));
     }
     worst.verdict(CONE, subject)
 }
 
+/// The lattices of one mean, and their rays.
+fn lattices(one: impl FnMut() -> Option<Lattice>) -> (Vec<Lattice>, Vec<Rays>) {
+    let lattices: Vec<Lattice> = std::iter::repeat_with(one).take(LATTICES).flatten().collect();
+    let sets = lattices.iter().map(|lattice| lattice.rays.clone()).collect();
+    (lattices, sets)
+}
+
 /// Volume, volume per mm of length, and rays.
-fn cone_sum(oracles: &Oracles, body: &Body, lattice: &Lattice) -> [f64; 3] {
+fn cone_sum(lattice: &Lattice, parts: &[(usize, Interval)]) -> [f64; 3] {
     // A pixel of area a, whose ray is ρ long and h deep, is seen under a h / ρ³ (to be integrated, not to be exact).
     let paths: Vec<f64> = lattice.rays.segments().iter().map(|ray| ray.length_mm()).collect();
     let mut sums = [0.0, 0.0, paths.len() as f64];
-    for (ray, part) in oracles.witness.parts(body, &lattice.rays) {
+    for &(ray, part) in parts {
         let (near, far) = (part.start(), part.end());
         let solid_angle = lattice.cell_mm2 * lattice.depth_mm / paths[ray].powi(3);
         // (far³ − near³) / 3 without cancellation.
