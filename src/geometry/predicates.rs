@@ -24,6 +24,11 @@ pub fn side_of_edge(u: [f64; 2], v: [f64; 2], p: [f64; 2]) -> i32 {
     if area != 0.0 {
         return if area > 0.0 { 1 } else { -1 };
     }
+    side_of_edge_on_tie(&u, &v)
+}
+
+/// As [`side_of_edge`], of a point that lies on the line: the infinitesimal move decides. In any exact arithmetic.
+pub(crate) fn side_of_edge_on_tie<T: PartialOrd>(u: &[T; 2], v: &[T; 2]) -> i32 {
     // d/dε of the area under p + (ε, ε²): first −(v.y − u.y), then v.x − u.x.
     match (u[1].partial_cmp(&v[1]), v[0].partial_cmp(&u[0])) {
         (Some(std::cmp::Ordering::Greater), _) => 1,

@@ -9,9 +9,9 @@
 //! What nobody asked for is not computed: entry order without colour, organs without attenuation if only attenuation
 //! is wanted. A pixel's values depend on its ray alone, so images are the same bits for any number of threads.
 
-mod forest;
+pub(super) mod forest;
 mod spot_check;
-mod sweep;
+pub(super) mod sweep;
 mod tile;
 
 use std::ops::AddAssign;
