@@ -393,7 +393,7 @@ fn ritrees_report_what_they_did_and_draw_their_map() {
         ("queries", "interpolated"),
         ("trees", "samples_taken"),
         ("trees", "tree_bytes"),
-        ("sampled_error", "compared"),
+        ("sampled_error_mm", "compared"),
     ] {
         assert!(trees[group][key].as_u64().is_some_and(|n| n > 0), "{group}.{key}: {trees}");
     }
