@@ -9,7 +9,11 @@
 //! | `histogram.csv` | errors by magnitude |
 //! | `worst.csv` | the worst rays, with what finds each again |
 
+mod base64;
 mod csv;
+mod page;
+mod panels;
+mod plot;
 
 use std::path::Path;
 
@@ -34,15 +38,16 @@ pub fn write(folder: &Path, report: &AuditReport, pictures: Option<&Pictures>) -
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Error::io("replace", &record, e)),
         _ => {}
     }
-    for (name, table) in [
+    let panels = pictures.map(|pictures| panels::panels(pictures, report.tolerance_mm)).transpose()?;
+    for (name, text) in [
+        (PAGE, page::page(report, panels.as_deref().unwrap_or_default())),
         ("organs.csv", csv::organs(report)),
         ("sections.csv", csv::sections(report)),
         ("histogram.csv", csv::histogram(report)),
         ("worst.csv", csv::worst(report)),
     ] {
-        write_atomically(&folder.join(name), |out| out.write_all(table.as_bytes()))?;
+        write_atomically(&folder.join(name), |out| out.write_all(text.as_bytes()))?;
     }
-    let _ = pictures;
     json::write(&record, report)?;
     Ok(())
 }
