@@ -89,7 +89,13 @@ struct Reproduced<'a> {
     cell_depth: Option<u32>,
 }
 
-fn reproduce(audit: &Audit, scene: &Scene, probe: Probe, args: &AuditArgs, out: &mut dyn Write) -> Result<()> {
+fn reproduce(
+    audit: &Audit,
+    scene: &Scene,
+    probe: Probe,
+    args: &AuditArgs,
+    out: &mut dyn Write,
+) -> Result<()> {
     let name = args.rays.organ.as_deref().unwrap_or_default();
     let organ = scene.organs.iter().position(|organ| organ.name == name).ok_or_else(|| {
         let names: Vec<_> = scene.organs.iter().map(|o| o.name.as_str()).collect();
@@ -220,7 +226,8 @@ mod tests {
 
     #[test]
     fn what_finds_a_ray_again_keeps_settings_and_drops_rays_limits_and_outputs() {
-        let line = "audit my.toml --rays 1e6 --seed=7 --max-depth 20 --limit-mm 0.5 -o out -oout --json --kvp 80";
+        let line =
+            "audit my.toml --rays 1e6 --seed=7 --max-depth 20 --limit-mm 0.5 -o out -oout --json --kvp 80";
         let words: Vec<String> = line.split(' ').map(String::from).collect();
         assert_eq!(setting_words(&words).join(" "), "audit my.toml --max-depth 20 --kvp 80");
         assert_eq!(shell_words(&["a b".into(), "it's".into(), "0..9:3".into()]), r"'a b' 'it'\''s' 0..9:3");

@@ -66,7 +66,11 @@ impl Histogram {
     /// Upper edges of the bins that hold any, ascending, with their counts; zeros are not among them.
     pub fn bins(&self) -> impl Iterator<Item = (f64, u64)> + '_ {
         let edge = |i: usize| f64::from_bits((self.first + i as u64 + 1) << SHIFT);
-        self.counts.iter().enumerate().filter(|(_, count)| **count > 0).map(move |(i, &count)| (edge(i), count))
+        self.counts
+            .iter()
+            .enumerate()
+            .filter(|(_, count)| **count > 0)
+            .map(move |(i, &count)| (edge(i), count))
     }
 
     /// The upper edge of the bin of the `rank`-th smallest, from 1.
@@ -197,9 +201,8 @@ impl Tally {
     fn quantile_bounds(&self, q: f64) -> [Option<f64>; 2] {
         let n = self.count as f64;
         let (middle, half) = (q * n, Z_95 * (n * q * (1.0 - q)).sqrt());
-        let value = |rank: f64| {
-            (1.0..=n).contains(&rank).then(|| self.histogram.at_rank(rank as u64).min(self.max))
-        };
+        let value =
+            |rank: f64| (1.0..=n).contains(&rank).then(|| self.histogram.at_rank(rank as u64).min(self.max));
         [value((middle - half).floor()), value((middle + half).ceil() + 1.0)]
     }
 }
@@ -304,7 +307,9 @@ mod tests {
         let figures = tally(&errors).figures(false);
         let mut sizes: Vec<f64> = errors.iter().map(|e| e.abs()).collect();
         sizes.sort_unstable_by(f64::total_cmp);
-        for (q, found) in [(0.5, figures.p50), (0.95, figures.p95), (0.99, figures.p99), (0.999, figures.p999)] {
+        for (q, found) in
+            [(0.5, figures.p50), (0.95, figures.p95), (0.99, figures.p99), (0.999, figures.p999)]
+        {
             let exact = sizes[(q * 20_001.0_f64).ceil() as usize - 1];
             assert!(exact <= found && found <= exact * (1.0 + 1.0 / 32.0), "{q}: {found}, not {exact}");
         }
@@ -318,7 +323,10 @@ mod tests {
         errors.chunks(700).for_each(|part| merged += &tally(part));
         let (parts, whole) = (merged.figures(true), tally(&errors).figures(true));
         assert_eq!(merged.histogram(), tally(&errors).histogram());
-        assert_eq!((parts.p99, parts.max, parts.beyond_tolerance), (whole.p99, whole.max, whole.beyond_tolerance));
+        assert_eq!(
+            (parts.p99, parts.max, parts.beyond_tolerance),
+            (whole.p99, whole.max, whole.beyond_tolerance)
+        );
         assert!((parts.mean - whole.mean).abs() <= 1e-12 * whole.mean);
         assert!((parts.bias - whole.bias).abs() <= 1e-12 * whole.mean);
     }

@@ -47,8 +47,10 @@ pub(super) struct Comparison<'a> {
 impl Comparison<'_> {
     /// Compares along every pixel's ray of a view.
     pub fn view(&self, index: usize, view: &View, control: &Control) -> Result<Ledger> {
-        let tiles: Vec<(Region, Vec<usize>)> =
-            tiles(view.size()).into_par_iter().map(|region| (region.clone(), self.touched(view, &region))).collect();
+        let tiles: Vec<(Region, Vec<usize>)> = tiles(view.size())
+            .into_par_iter()
+            .map(|region| (region.clone(), self.touched(view, &region)))
+            .collect();
         let outlines = self.outlines(view, &tiles, control)?;
         let at_work = self.at_work(Some(view), outlines);
         let strips: Vec<&[(Region, Vec<usize>)]> = tiles.chunk_by(|a, b| a.0.rows == b.0.rows).collect();
@@ -69,12 +71,7 @@ impl Comparison<'_> {
     }
 
     /// Compares along the lines of some blocks.
-    pub fn lines(
-        &self,
-        lines: &Lines,
-        blocks: Range<u64>,
-        control: &Control,
-    ) -> Result<Ledger> {
+    pub fn lines(&self, lines: &Lines, blocks: Range<u64>, control: &Control) -> Result<Ledger> {
         let at_work = self.at_work(None, Vec::new());
         let all: Vec<usize> = (0..self.scene.organs.len()).collect();
         let mut total = self.ledger();

@@ -182,7 +182,9 @@ impl<'a> Audit<'a> {
             }
             set => {
                 let lines = Lines::of(set, bodies(self.scene));
-                for (lines, (name, blocks)) in lines.iter().flat_map(|l| l.sections().into_iter().map(move |s| (l, s))) {
+                for (lines, (name, blocks)) in
+                    lines.iter().flat_map(|l| l.sections().into_iter().map(move |s| (l, s)))
+                {
                     let ledger = comparison.lines(lines, blocks, control)?;
                     sections.push(SectionFigures::of_lines(name, &ledger, self.is_sampled()));
                     total += &ledger;
@@ -200,14 +202,16 @@ impl<'a> Audit<'a> {
         let refuse = |what: &str, remedy: &str| Error::input("the ray to reproduce", what, remedy);
         let (ray, view) = match probe {
             Probe::Ray { source, path } => {
-                let ray = Segment::along(source, path)
-                    .ok_or_else(|| refuse("it has no direction, or is not finite", "give x,y,z,dx,dy,dz in mm"))?;
+                let ray = Segment::along(source, path).ok_or_else(|| {
+                    refuse("it has no direction, or is not finite", "give x,y,z,dx,dy,dz in mm")
+                })?;
                 (ray, None)
             }
             Probe::Pixel { view, column, row } => {
                 let views: &[View] = if let RaySet::Views(views) = &self.settings.rays { views } else { &[] };
                 let seen = views.get(view).filter(|v| column < v.size().0 && row < v.size().1);
-                let seen = seen.ok_or_else(|| refuse("there is no such pixel", "give view,column,row from 0"))?;
+                let seen =
+                    seen.ok_or_else(|| refuse("there is no such pixel", "give view,column,row from 0"))?;
                 (seen.segment(column, row), Some((seen, column, row)))
             }
         };

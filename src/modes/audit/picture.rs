@@ -47,7 +47,8 @@ impl Audit<'_> {
             control.check()?;
             let rays: Vec<Segment> = region.places().map(|(c, r)| view.segment(c, r)).collect();
             let organs = comparison.touched(view, &region);
-            let pixels = self.pixels(&*method, &*against, Batch { rays: &rays, region: Some(&region) }, &organs);
+            let pixels =
+                self.pixels(&*method, &*against, Batch { rays: &rays, region: Some(&region) }, &organs);
             Ok((region, pixels))
         });
         let tiles: Vec<(Region, Vec<Pixel>)> = tiles.collect::<Result<_>>()?;

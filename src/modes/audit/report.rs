@@ -8,6 +8,10 @@ use super::ledger::{KindLedger, Ledger, OrganLedger};
 use super::outline;
 use super::worst::{Origin, Suspect};
 use super::{Audit, RaySet, SILHOUETTE_SHARE, TRANSMISSION_TOLERANCE};
+use crate::exact::Body;
+use crate::exact::judge::length_in_parallel_body;
+use crate::geometry::Segment;
+use crate::geometry::numeric::gamma;
 use crate::modes::figures::{Figures, Histogram, Tally};
 use crate::modes::project::{Found, Method, TreeSettings};
 use crate::scene::organ::Origin as OrganOrigin;
@@ -184,6 +188,10 @@ pub struct WorstRay {
     /// The depth of the tree's cell that answered.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cell_depth: Option<u32>,
+    /// By how much the length changes if all planes of a convex body move out, or in, by as much as rounding may move
+    /// them. An error that is no larger is none of the method's: a ray in the plane of a flat side is in or out by chance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rounding_mm: Option<f64>,
     /// The view, or where lines come from.
     pub place: String,
     /// View (from 0), column and row, if it is a pixel's.
@@ -346,8 +354,7 @@ fn bars([interpolated, traced]: [Histogram; 2]) -> Vec<Bar> {
     };
     let (interpolated_bins, traced_bins) = (of(&interpolated), of(&traced));
     let all = || interpolated_bins.iter().chain(&traced_bins).map(|bin| bin.0);
-    let zero =
-        Bar { from_mm: 0.0, to_mm: 0.0, interpolated: interpolated.zeros(), traced: traced.zeros() };
+    let zero = Bar { from_mm: 0.0, to_mm: 0.0, interpolated: interpolated.zeros(), traced: traced.zeros() };
     let mut bars = vec![zero];
     let (Some(first), Some(last)) = (all().min(), all().max()) else { return bars };
     // Infinite errors make no picture; they are in every figure.
@@ -362,6 +369,17 @@ fn bars([interpolated, traced]: [Histogram; 2]) -> Vec<Bar> {
         });
     }
     bars
+}
+
+/// See [`WorstRay::rounding_mm`].
+///
+/// Engines are exact for vertices, or planes, moved by γ₈ of their distance from the source; two engines may move them
+/// apart.
+fn rounding_mm(body: &Body, ray: &Segment) -> Option<f64> {
+    let mesh = body.convexity().ok()?;
+    let farthest = body.bounds().corners().into_iter().map(|c| (c - ray.line().origin()).length());
+    let shift_mm = gamma(16) * farthest.fold(0.0, f64::max);
+    Some(length_in_parallel_body(mesh, ray, shift_mm) - length_in_parallel_body(mesh, ray, -shift_mm))
 }
 
 fn worst(audit: &Audit, suspects: Vec<Suspect>) -> Vec<WorstRay> {
@@ -395,6 +413,7 @@ fn worst_ray(audit: &Audit, rank: usize, suspect: &Suspect) -> Option<WorstRay> 
         reference_mm: suspect.reference_mm,
         found: if suspect.found == Found::Interpolated { "interpolated" } else { "traced" },
         cell_depth: audit.method.depth(suspect.organ, &suspect.ray),
+        rounding_mm: rounding_mm(&audit.scene.organs[suspect.organ].body, &suspect.ray),
         place,
         pixel,
         source_mm: source.to_array(),

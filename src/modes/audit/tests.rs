@@ -121,7 +121,7 @@ struct Trees<'a> {
 impl<'a> Trees<'a> {
     fn new(scene: &'a Scene, factor: f32) -> Self {
         // Fine, so that the error of interpolation does not hide the fault.
-        let parameters = Parameters { distance_threshold: 2e-4, max_depth: 24, ..Parameters::default() };
+        let parameters = Parameters { distance_threshold: 2e-5, max_depth: 40, ..Parameters::default() };
         let tree = |(i, body): (usize, &&'a Body)| {
             let factor = if i == 1 { factor } else { 1.0 };
             RiTree::new(Perturbed(ChordLength::new(body).expect("convex"), factor), parameters)
@@ -271,7 +271,8 @@ fn reports_are_the_same_for_one_two_and_eight_threads() {
         })
     };
     let views = RaySet::Views(scene.beam.views().expect("views"));
-    for rays in [views, RaySet::Random { rays: 30_000, seed: 5 }, RaySet::Adversarial { rays: 100, seed: 5 }] {
+    for rays in [views, RaySet::Random { rays: 30_000, seed: 5 }, RaySet::Adversarial { rays: 100, seed: 5 }]
+    {
         let one = report(1, rays.clone());
         assert!(one == report(2, rays.clone()) && one == report(8, rays));
     }

@@ -55,7 +55,8 @@ pub fn histogram(report: &AuditReport) -> String {
     for organ in std::iter::once(&report.whole).chain(&report.organs) {
         for bar in organ.histogram.iter().filter(|bar| bar.interpolated + bar.traced > 0) {
             let name = field(&organ.organ);
-            let _ = writeln!(text, "{name},{},{},{},{}", bar.from_mm, bar.to_mm, bar.interpolated, bar.traced);
+            let _ =
+                writeln!(text, "{name},{},{},{},{}", bar.from_mm, bar.to_mm, bar.interpolated, bar.traced);
         }
     }
     text
@@ -64,17 +65,18 @@ pub fn histogram(report: &AuditReport) -> String {
 /// A row for each of the worst rays.
 pub fn worst(report: &AuditReport) -> String {
     let mut text = String::from(
-        "rank,organ,error_mm,method_mm,reference_mm,found,cell_depth,place,view,column,row,\
+        "rank,organ,error_mm,method_mm,reference_mm,found,cell_depth,rounding_mm,place,view,column,row,\
          source_x_mm,source_y_mm,source_z_mm,path_x_mm,path_y_mm,path_z_mm,reproduce\n",
     );
     for ray in &report.worst {
         let depth = ray.cell_depth.map(|d| d.to_string()).unwrap_or_default();
+        let rounding = ray.rounding_mm.map(|mm| mm.to_string()).unwrap_or_default();
         let pixel = ray.pixel.map_or(",,".into(), |[view, column, row]| format!("{view},{column},{row}"));
         let [source, path] = [ray.source_mm, ray.path_mm].map(|[x, y, z]| format!("{x},{y},{z}"));
         let (organ, place, reproduce) = (field(&ray.organ), field(&ray.place), field(&ray.reproduce));
         let _ = writeln!(
             text,
-            "{},{organ},{},{},{},{},{depth},{place},{pixel},{source},{path},{reproduce}",
+            "{},{organ},{},{},{},{},{depth},{rounding},{place},{pixel},{source},{path},{reproduce}",
             ray.rank, ray.error_mm, ray.method_mm, ray.reference_mm, ray.found
         );
     }
@@ -90,7 +92,11 @@ fn numbers(f: &Figures) -> String {
 
 /// A text as one field, in quotes where it must be.
 fn field(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.into() }
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.into()
+    }
 }
 
 #[cfg(test)]

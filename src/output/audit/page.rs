@@ -76,10 +76,16 @@ fn tiles(report: &AuditReport) -> String {
     let interpolated = whole.interpolated_interior_mm.compared + whole.interpolated_silhouette_mm.compared;
     let tile = |value: String, words: String| format!("<div><b>{value}</b>{words}</div>");
     let mut all = vec![
-        tile(format!("{} mm", short(f.mean)), format!("mean error; the mean length is {} mm", short(f.mean_reference))),
+        tile(
+            format!("{} mm", short(f.mean)),
+            format!("mean error; the mean length is {} mm", short(f.mean_reference)),
+        ),
         tile(format!("{} mm", short(f.p99)), "99 % of errors are no larger".into()),
         tile(format!("{} mm", short(f.max)), "the largest error".into()),
-        tile(format!("{} %", short(100.0 * f.beyond_tolerance)), format!("beyond {} mm", report.tolerance_mm)),
+        tile(
+            format!("{} %", short(100.0 * f.beyond_tolerance)),
+            format!("beyond {} mm", report.tolerance_mm),
+        ),
         tile(short(report.transmission.max), "the largest ΔT of a ray".into()),
         tile(
             format!("{} %", short(100.0 * interpolated as f64 / f.compared.max(1) as f64)),
@@ -96,7 +102,8 @@ fn tiles(report: &AuditReport) -> String {
         ));
     }
     if let Some(reference) = report.reference {
-        let words = format!("the reference's own largest error on {} rays in exact arithmetic", reference.rays);
+        let words =
+            format!("the reference's own largest error on {} rays in exact arithmetic", reference.rays);
         all.push(tile(format!("{} ulp", short(reference.max_ulps)), words));
     }
     format!("<div class=\"tiles\">{}</div>", all.concat())
@@ -228,13 +235,15 @@ fn by_section(report: &AuditReport) -> String {
     let table = format!(
         "<div class=\"wide\"><table><thead><tr><th>mm</th>{HEAD}</tr></thead><tbody>{rows}</tbody></table></div>"
     );
-    if figure.is_empty() { table } else { format!("{figure}<details><summary>As numbers</summary>{table}</details>") }
+    if figure.is_empty() {
+        table
+    } else {
+        format!("{figure}<details><summary>As numbers</summary>{table}</details>")
+    }
 }
 
 fn by_distance(report: &AuditReport) -> String {
-    if report.by_distance.is_empty() {
-        return String::new();
-    }
+    let seen = || report.by_distance.iter().filter(|d| d.length_mm.compared > 0);
     let name = |from: Option<f64>, to: Option<f64>| match (from, to) {
         (None, _) => "outside".into(),
         (Some(from), Some(to)) => format!("{from}–{to}"),
@@ -243,8 +252,8 @@ fn by_distance(report: &AuditReport) -> String {
     let plot = Plot {
         across: "distance of the ray from the organ's outline, mm where the organ is",
         up: "error, mm",
-        places: report.by_distance.iter().map(|d| name(d.from_mm, d.to_mm)).collect(),
-        series: curves(report.by_distance.iter().map(|d| &d.length_mm)),
+        places: seen().map(|d| name(d.from_mm, d.to_mm)).collect(),
+        series: curves(seen().map(|d| &d.length_mm)),
         form: Form::Lines,
     };
     let svg = plot.svg();
@@ -267,7 +276,10 @@ fn pictures(report: &AuditReport, panels: &[Panel]) -> String {
             )
         })
         .collect();
-    format!("<p>View {place}: p = Σ μL at {} keV.</p><div class=\"panels\">{figures}</div>", short(report.energy_kev))
+    format!(
+        "<p>View {place}: p = Σ μL at {} keV.</p><div class=\"panels\">{figures}</div>",
+        short(report.energy_kev)
+    )
 }
 
 fn organs(report: &AuditReport) -> String {
@@ -283,7 +295,8 @@ fn organs(report: &AuditReport) -> String {
             }
         };
         let compared = organ.method.length_mm.compared.max(1);
-        let interpolated = organ.interpolated_interior_mm.compared + organ.interpolated_silhouette_mm.compared;
+        let interpolated =
+            organ.interpolated_interior_mm.compared + organ.interpolated_silhouette_mm.compared;
         format!(
             "<tr><th>{}</th><td>{}</td><td>{} %</td>{}<td>{}</td>{mesh}</tr>",
             escape(&organ.organ),
@@ -304,13 +317,14 @@ fn worst(report: &AuditReport) -> String {
     let row = |w: &crate::modes::audit::WorstRay| {
         let pixel = w.pixel.map(|[_, column, row]| format!(" ({column}, {row})")).unwrap_or_default();
         format!(
-            "<tr><td>{}</td><th>{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}{pixel}</td>\
+            "<tr><td>{}</td><th>{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}{pixel}</td>\
              <td class=\"command\"><code>{}</code></td></tr>",
             w.rank,
             escape(&w.organ),
             short(w.error_mm),
             w.method_mm,
             w.reference_mm,
+            w.rounding_mm.map(short).unwrap_or_default(),
             w.found,
             w.cell_depth.map(|d| d.to_string()).unwrap_or_default(),
             escape(&w.place),
@@ -323,17 +337,16 @@ fn worst(report: &AuditReport) -> String {
     let table = |rows: String| {
         format!(
             "<div class=\"wide\"><table><thead><tr><th></th><th>organ</th><th>error, mm</th><th>method, mm</th>\
-             <th>reference, mm</th><th>found</th><th>depth</th><th>view (column, row)</th><th>to see it again</th>\
+             <th>reference, mm</th><th>rounding, mm</th><th>found</th><th>depth</th><th>view (column, row)</th><th>to see it again</th>\
              </tr></thead><tbody>{rows}</tbody></table></div>"
         )
     };
     let (first, rest) = report.worst.split_at(report.worst.len().min(10));
     let more = match rest.len() {
         0 => String::new(),
-        n => format!(
-            "<details><summary>{n} more</summary>{}</details>",
-            table(rest.iter().map(row).collect())
-        ),
+        n => {
+            format!("<details><summary>{n} more</summary>{}</details>", table(rest.iter().map(row).collect()))
+        }
     };
     table(first.iter().map(row).collect()) + &more
 }
@@ -359,6 +372,9 @@ fn definitions(report: &AuditReport) -> String {
          either. Organs from files, of several shapes, tubes and torus sectors have none.</dd>\
          <dt>ΔT</dt><dd>The change of T = exp(−Σ μL) by the error, at the mean energy of the photons; of a whole ray, or of \
          one organ's error alone.</dd>\
+         <dt>Rounding</dt><dd>Of a ray in a convex organ: by how much its length changes if all faces move out, or in, by as \
+         much as rounding may move them. An error that is no larger is nobody's fault: a ray in the plane of a flat side \
+         is in or out by chance.</dd>\
          <dt>Distance</dt><dd>From the pixel to the nearest that misses the organ, scaled to the depth of the organ's \
          middle.</dd></dl><p class=\"note\">Primary radiation only, no scatter; not for clinical use.</p>",
         escape(reference),

@@ -132,7 +132,7 @@ mod tests {
         error_mm[20_003] = 3.0;
         let pool = Pool::of((columns, rows));
         assert_eq!((pool.side, pool.columns, pool.rows), (3, 500, 14));
-        let seen = pool.map(&|pixels| [u8::from(pixels.any(|i| error_mm[i] > 0.0)); 3]);
+        let seen = pool.map(&|pixels| [u8::from(pixels.map(|i| error_mm[i]).fold(0.0, f64::max) > 0.0); 3]);
         assert_eq!(seen.iter().filter(|&&c| c == 1).count(), 3);
         assert_eq!(seen.len(), 3 * 500 * 14);
         assert_eq!((heat(0.0), heat(1.0)), (HEAT[0], HEAT[5]));

@@ -18,8 +18,8 @@ const BOTTOM: f64 = 46.0;
 /// Names of places at most: as many as stand side by side.
 const MOST_NAMES: usize = 13;
 
-/// Decades shown at most, from the largest value down: below is rounding that nobody compares with the rest.
-const MOST_DECADES: i32 = 18;
+/// Decades shown at most, from the largest value down: what is below is rounding beside the rest, and left out.
+const MOST_DECADES: i32 = 8;
 
 /// One set of values, one for each place; those that are not positive are left out.
 pub struct Series {
@@ -34,7 +34,7 @@ pub struct Series {
 /// How values are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// Bars side by side.
+    /// Bars, those of one place overlapping.
     Bars,
     /// Points joined by lines.
     Lines,
@@ -57,7 +57,8 @@ pub struct Plot<'a> {
 impl Plot<'_> {
     /// The plot as an SVG element. Empty if there is no positive value.
     pub fn svg(&self) -> String {
-        let positive = || self.series.iter().flat_map(|s| &s.values).copied().filter(|v| *v > 0.0 && v.is_finite());
+        let positive =
+            || self.series.iter().flat_map(|s| &s.values).copied().filter(|v| *v > 0.0 && v.is_finite());
         let (Some(least), Some(most)) = (positive().reduce(f64::min), positive().reduce(f64::max)) else {
             return String::new();
         };
@@ -94,7 +95,11 @@ impl Plot<'_> {
         let every = self.places.len().div_ceil(MOST_NAMES).max(1);
         for (i, place) in self.places.iter().enumerate().step_by(every) {
             let x = scale.x(i as f64 + 0.5);
-            let _ = write!(svg, "<text class=\"at\" x=\"{x:.1}\" y=\"{}\">{place}</text>", HEIGHT - BOTTOM + 16.0);
+            let _ = write!(
+                svg,
+                "<text class=\"at\" x=\"{x:.1}\" y=\"{}\">{place}</text>",
+                HEIGHT - BOTTOM + 16.0
+            );
         }
         let middle = 0.5 * (LEFT + WIDTH - RIGHT);
         let up = 0.5 * (TOP + HEIGHT - BOTTOM);
@@ -109,16 +114,18 @@ impl Plot<'_> {
     }
 
     fn bars(&self, scale: &Scale, svg: &mut String) {
-        let width = 0.8 / self.series.len().max(1) as f64;
+        // They overlap, so that one on its own is wide.
+        let step = 0.3 / self.series.len().max(2) as f64;
+        let width = 0.9 - step * (self.series.len().max(1) - 1) as f64;
         for (nth, series) in self.series.iter().enumerate() {
             for (i, &value) in series.values.iter().enumerate().filter(|(_, v)| **v > 0.0) {
-                let from = i as f64 + 0.1 + nth as f64 * width;
+                let from = i as f64 + 0.05 + nth as f64 * step;
                 let (x, next, y) = (scale.x(from), scale.x(from + width), scale.y(value));
                 // A bar of one still shows.
                 let y = y.min(HEIGHT - BOTTOM - 2.0);
                 let _ = write!(
                     svg,
-                    "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"{}\"><title>{}: {value}</title></rect>",
+                    "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"{}\" fill-opacity=\"0.85\"><title>{}: {value}</title></rect>",
                     next - x,
                     HEIGHT - BOTTOM - y,
                     series.colour,
@@ -130,7 +137,8 @@ impl Plot<'_> {
 
     fn lines(&self, scale: &Scale, svg: &mut String) {
         for series in &self.series {
-            let shown = series.values.iter().enumerate().filter(|(_, v)| **v > 0.0 && v.is_finite());
+            let lowest = 10f64.powi(scale.low);
+            let shown = series.values.iter().enumerate().filter(|(_, v)| **v >= lowest && v.is_finite());
             let points: Vec<(f64, f64, f64)> =
                 shown.map(|(i, &v)| (scale.x(i as f64 + 0.5), scale.y(v), v)).collect();
             let path: Vec<String> = points.iter().map(|(x, y, _)| format!("{x:.1},{y:.1}")).collect();
