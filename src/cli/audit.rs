@@ -198,6 +198,13 @@ fn summary(report: &AuditReport, folder: Option<&Path>) -> String {
     whole.accumulation.iter().for_each(|kind| row("accumulation", &kind.length_mm));
     whole.mesh.iter().for_each(|kind| row("mesh to closed form", &kind.length_mm));
     row("change of transmission", &report.transmission);
+    if report.decided_by_rounding > 0 {
+        let count = report.decided_by_rounding;
+        let _ = writeln!(
+            text,
+            "{count} traced lengths differ, but by no more than rounding of the faces may: taken for equal"
+        );
+    }
     if let Some(bounds) = whole.method.length_mm.confidence {
         let [low, high] = bounds.mean.map(output::short);
         let beyond = bounds.beyond_tolerance.map(|share| output::short(100.0 * share));

@@ -18,9 +18,12 @@ use super::outline::OutlineMap;
 use super::rays::{BLOCK, Lines};
 use super::worst::{Origin, Suspect};
 use crate::error::Result;
+use crate::exact::Body;
+use crate::exact::judge::length_in_parallel_body;
+use crate::geometry::numeric::gamma;
 use crate::geometry::{Bounds, Region, Segment};
 use crate::modes::Control;
-use crate::modes::project::tiles;
+use crate::modes::project::{Found, tiles};
 use crate::scene::organ::Origin as OrganOrigin;
 use crate::scene::shape::Shape;
 use crate::scene::{Organ, Scene, View};
@@ -29,6 +32,10 @@ use crate::scene::{Organ, Scene, View};
 /// ellipsoid which fills the organ's box has along the ray. On an ellipsoid these are the outer 4.6 % of the radius:
 /// there the chord grows more than three times as fast with the distance from the outline as it is long per radius.
 pub const SILHOUETTE_SHARE: f64 = 0.3;
+
+/// Differences between exact engines above this, mm, are looked into: where a line is not all but within a face's plane, they
+/// differ by less.
+const SURELY_NO_ROUNDING_MM: f64 = 1e-6;
 
 /// Blocks of lines whose ledgers are held at a time.
 const WAVE: u64 = 32;
@@ -183,7 +190,11 @@ impl AtWork<'_> {
     /// Enters what the batch's rays show of each of the organs.
     fn compare(&self, batch: Batch, organs: &[usize], origin: &dyn Fn(usize) -> Origin, ledger: &mut Ledger) {
         ledger.rays += batch.rays.len() as u64;
-        let answers: Vec<OrganAnswers> = organs.iter().filter_map(|&organ| self.ask(organ, batch)).collect();
+        let mut answers: Vec<OrganAnswers> =
+            organs.iter().filter_map(|&organ| self.ask(organ, batch)).collect();
+        for of_organ in &mut answers {
+            ledger.decided_by_rounding += self.settle(of_organ, batch);
+        }
         let optics = self.comparison.optics;
         let mut exponents = vec![[0.0; 2]; batch.rays.len()];
         for of_organ in &answers {
@@ -239,6 +250,24 @@ impl AtWork<'_> {
         })
     }
 
+    /// Takes traced lengths that only rounding parts from the reference's for equal; returns how many there were.
+    fn settle(&self, answers: &mut OrganAnswers, batch: Batch) -> u64 {
+        let body = &self.comparison.scene.organs[answers.organ].body;
+        let mut settled = 0;
+        for (i, &at) in answers.places.iter().enumerate() {
+            let (method, reference_mm) = (&mut answers.method[i], answers.against[i].length_mm);
+            let differs = (method.length_mm - reference_mm).abs() > SURELY_NO_ROUNDING_MM;
+            if differs && method.found != Found::Interpolated {
+                let lengths = [method.length_mm, reference_mm];
+                if are_equal_but_for_rounding(body, &batch.rays[at], lengths) {
+                    method.length_mm = reference_mm;
+                    settled += 1;
+                }
+            }
+        }
+        settled
+    }
+
     /// Enters the errors of one organ; rays that miss it whoever is asked are no errors and are not counted.
     fn enter(
         &self,
@@ -285,6 +314,22 @@ impl AtWork<'_> {
             }
         }
     }
+}
+
+/// By how much rounding may move a convex body's planes, seen from where a ray starts, mm: engines are exact for planes, or
+/// vertices, moved by γ₈ of their distance, and two of them may move them apart.
+pub(super) fn rounding_shift_mm(body: &Body, ray: &Segment) -> f64 {
+    let distances = body.bounds().corners().into_iter().map(|c| (c - ray.line().origin()).length());
+    gamma(16) * distances.fold(0.0, f64::max)
+}
+
+/// Whether lengths are all exact for convex bodies whose planes are moved by rounding: a line in the plane of a flat side is
+/// in or out by chance, whole or not at all.
+fn are_equal_but_for_rounding(body: &Body, ray: &Segment, lengths: [f64; 2]) -> bool {
+    let Ok(mesh) = body.convexity() else { return false };
+    let shift_mm = rounding_shift_mm(body, ray);
+    let [least, most] = [-shift_mm, shift_mm].map(|shift| length_in_parallel_body(mesh, ray, shift));
+    lengths.iter().all(|length| (least - shift_mm..=most + shift_mm).contains(length))
 }
 
 /// Where a ray whose reference chord is `length_mm` passes the body of a box.

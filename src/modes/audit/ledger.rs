@@ -97,6 +97,8 @@ impl AddAssign<&Self> for OrganLedger {
 pub(super) struct Ledger {
     tolerances: Tolerances,
     pub rays: u64,
+    /// Traced lengths that differ from the reference's, but by no more than rounding may.
+    pub decided_by_rounding: u64,
     /// Organs that no ray has met have none.
     organs: Vec<Option<Box<OrganLedger>>>,
     /// Of the whole ray's transmission, all organs' errors together.
@@ -111,6 +113,7 @@ impl Ledger {
         Self {
             tolerances,
             rays: 0,
+            decided_by_rounding: 0,
             organs: (0..organs).map(|_| None).collect(),
             transmission: Tally::new(tolerances.transmission),
             by_distance: vec![Tally::new(tolerances.length_mm); outline::BINS],
@@ -140,6 +143,7 @@ impl Ledger {
 impl AddAssign<&Self> for Ledger {
     fn add_assign(&mut self, other: &Self) {
         self.rays += other.rays;
+        self.decided_by_rounding += other.decided_by_rounding;
         for (i, organ) in other.organs() {
             *self.organ(i) += organ;
         }
