@@ -177,13 +177,13 @@ fn summary(report: &AuditReport, folder: Option<&Path>) -> String {
     );
     let _ = writeln!(
         text,
-        "{:24}{:>12}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}",
+        "{:28}{:>12}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}",
         "error", "compared", "mean", "RMS", "p50", "p95", "p99", "p99.9", "max", "bias", "beyond %"
     );
     let mut row = |name: &str, f: &Figures| {
         if f.compared > 0 {
             let share = 100.0 * f.beyond_tolerance;
-            let _ = write!(text, "{name:24}{:>12}", f.compared);
+            let _ = write!(text, "{name:28}{:>12}", f.compared);
             for value in [f.mean, f.rms, f.p50, f.p95, f.p99, f.p999, f.max, f.bias, share] {
                 let _ = write!(text, "{:>10}", output::short(value));
             }
@@ -192,9 +192,9 @@ fn summary(report: &AuditReport, folder: Option<&Path>) -> String {
     };
     row("all organs", &whole.method.length_mm);
     row("  interpolated, interior", &whole.interpolated_interior_mm);
-    row("  interpolated, outline", &whole.interpolated_silhouette_mm);
+    row("  interpolated, silhouette", &whole.interpolated_silhouette_mm);
     row("  traced, interior", &whole.traced_interior_mm);
-    row("  traced, outline", &whole.traced_silhouette_mm);
+    row("  traced, silhouette", &whole.traced_silhouette_mm);
     whole.accumulation.iter().for_each(|kind| row("accumulation", &kind.length_mm));
     whole.mesh.iter().for_each(|kind| row("mesh to closed form", &kind.length_mm));
     row("change of transmission", &report.transmission);

@@ -63,29 +63,26 @@ impl Histogram {
         self.zeros
     }
 
-    /// Upper edges of the bins that hold any, ascending, with their counts; zeros are not among them.
-    pub fn bins(&self) -> impl Iterator<Item = (f64, u64)> + '_ {
-        let edge = |i: usize| f64::from_bits((self.first + i as u64 + 1) << SHIFT);
-        self.counts
-            .iter()
-            .enumerate()
-            .filter(|(_, count)| **count > 0)
-            .map(move |(i, &count)| (edge(i), count))
+    /// The bins that hold any, ascending: both edges, and how many; zeros are not among them.
+    pub fn bins(&self) -> impl Iterator<Item = ([f64; 2], u64)> + '_ {
+        let edge = |i: usize| f64::from_bits((self.first + i as u64) << SHIFT);
+        let filled = self.counts.iter().enumerate().filter(|(_, count)| **count > 0);
+        filled.map(move |(i, &count)| ([edge(i), edge(i + 1)], count))
     }
 
-    /// The upper edge of the bin of the `rank`-th smallest, from 1.
-    fn at_rank(&self, rank: u64) -> f64 {
+    /// The edges of the bin of the `rank`-th smallest, from 1.
+    fn at_rank(&self, rank: u64) -> [f64; 2] {
         let mut seen = self.zeros;
         if rank <= seen {
-            return 0.0;
+            return [0.0; 2];
         }
-        for (edge, count) in self.bins() {
+        for (edges, count) in self.bins() {
             seen += count;
             if rank <= seen {
-                return edge;
+                return edges;
             }
         }
-        0.0
+        [0.0; 2]
     }
 }
 
@@ -163,7 +160,7 @@ impl Tally {
         let count = self.count.max(1) as f64;
         let quantile = |q: f64| {
             let rank = ((q * count).ceil() as u64).clamp(1, self.count.max(1));
-            self.histogram.at_rank(rank).min(self.max)
+            self.histogram.at_rank(rank)[1].min(self.max)
         };
         Figures {
             compared: self.count,
@@ -201,9 +198,9 @@ impl Tally {
     fn quantile_bounds(&self, q: f64) -> [Option<f64>; 2] {
         let n = self.count as f64;
         let (middle, half) = (q * n, Z_95 * (n * q * (1.0 - q)).sqrt());
-        let value =
-            |rank: f64| (1.0..=n).contains(&rank).then(|| self.histogram.at_rank(rank as u64).min(self.max));
-        [value((middle - half).floor()), value((middle + half).ceil() + 1.0)]
+        let edges = |rank: f64| (1.0..=n).contains(&rank).then(|| self.histogram.at_rank(rank as u64));
+        let low = edges((middle - half).floor()).map(|edges| edges[0]);
+        [low, edges((middle + half).ceil() + 1.0).map(|edges| edges[1].min(self.max))]
     }
 }
 

@@ -52,8 +52,8 @@ pub use picture::Pictures;
 pub use rays::{Aim, RaySet};
 pub use report::{
     AuditReport, Bar, DistanceFigures, KindFigures, OrganFigures, RayWords, ReferenceError, SectionFigures,
-    WorstRay, shell_word,
 };
+pub use worst::{WorstRay, shell_word};
 
 /// The tolerance of an audit that names none, mm: half a millimetre of soft tissue changes T by 1 %, about the noise of a
 /// good radiograph's pixel.
@@ -232,6 +232,30 @@ impl<'a> Audit<'a> {
         })
     }
 
+    /// Rays that the reference is worth being recomputed for, by organ: the report's worst, and of the audit's first rays those
+    /// that meet the organ, up to `each`.
+    pub fn reference_sample(&self, report: &AuditReport, each: usize) -> Vec<(usize, Vec<Segment>)> {
+        let first: Vec<Segment> = match &self.settings.rays {
+            RaySet::Views(views) => views.iter().flat_map(|view| lattice(view, each)).collect(),
+            set => {
+                let lines = Lines::of(set, bodies(self.scene));
+                let shots = lines.into_iter().flat_map(|lines| lines.block(0));
+                shots.filter_map(|(source, path)| Segment::along(source, path)).collect()
+            }
+        };
+        let of_organ = |(organ, it): (usize, &crate::scene::Organ)| {
+            let worst = report.worst.iter().filter(|worst| worst.organ == it.name);
+            let worst = worst.filter_map(|w| Segment::along(w.source_mm.into(), w.path_mm.into()));
+            let mut parts = Vec::new();
+            let mut meets = |ray: &&Segment| {
+                it.body.chords_of_segment(ray, &mut parts);
+                !parts.is_empty()
+            };
+            (organ, worst.chain(first.iter().filter(|ray| meets(ray)).take(each).copied()).collect())
+        };
+        self.scene.organs.iter().enumerate().map(of_organ).collect()
+    }
+
     fn comparison(&self) -> Comparison<'_> {
         Comparison {
             scene: self.scene,
@@ -268,6 +292,14 @@ impl<'a> Audit<'a> {
             _ => None,
         }
     }
+}
+
+/// At least `count` of a view's rays, if there are as many, evenly spread.
+fn lattice(view: &View, count: usize) -> impl Iterator<Item = Segment> + '_ {
+    let (columns, rows) = view.size();
+    let step = ((view.pixels() as f64 / count.max(1) as f64).sqrt() as usize).max(1);
+    let tops = (0..rows).step_by(step);
+    tops.flat_map(move |row| (0..columns).step_by(step).map(move |column| view.segment(column, row)))
 }
 
 fn bodies(scene: &Scene) -> Vec<&Body> {

@@ -2,17 +2,14 @@
 
 use serde::Serialize;
 
-use super::compare::{closed_form, rounding_shift_mm};
+use super::compare::closed_form;
 use super::finder::Reference;
 use super::ledger::{KindLedger, Ledger, OrganLedger};
 use super::outline;
-use super::worst::{Origin, Suspect};
+use super::worst::{self, WorstRay};
 use super::{Audit, RaySet, SILHOUETTE_SHARE, TRANSMISSION_TOLERANCE};
-use crate::exact::Body;
-use crate::exact::judge::length_in_parallel_body;
-use crate::geometry::Segment;
 use crate::modes::figures::{Figures, Histogram, Tally};
-use crate::modes::project::{Found, Method, TreeSettings};
+use crate::modes::project::{Method, TreeSettings};
 use crate::scene::organ::Origin as OrganOrigin;
 use crate::scene::{Pose, Scene, View};
 
@@ -172,41 +169,6 @@ pub struct DistanceFigures {
     pub length_mm: Figures,
 }
 
-/// One of the worst rays.
-#[derive(Clone, Debug, Serialize)]
-pub struct WorstRay {
-    /// From 1.
-    pub rank: usize,
-    /// The organ.
-    pub organ: String,
-    /// The method's length less the reference's, mm.
-    pub error_mm: f64,
-    /// The method's length, mm.
-    pub method_mm: f64,
-    /// The reference's, mm.
-    pub reference_mm: f64,
-    /// `interpolated` or `traced`.
-    pub found: &'static str,
-    /// The depth of the tree's cell that answered.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub cell_depth: Option<u32>,
-    /// By how much the length changes if all planes of a convex body move out, or in, by as much as rounding may move
-    /// them.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rounding_mm: Option<f64>,
-    /// The view, or where lines come from.
-    pub place: String,
-    /// View (from 0), column and row, if it is a pixel's.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub pixel: Option<[u32; 3]>,
-    /// Where it starts, patient LPS, mm.
-    pub source_mm: [f64; 3],
-    /// The way to its end, mm.
-    pub path_mm: [f64; 3],
-    /// The arguments that find it again.
-    pub reproduce: String,
-}
-
 impl AuditReport {
     pub(super) fn new(audit: &Audit, total: Ledger, sections: Vec<SectionFigures>) -> Self {
         let settings = audit.settings();
@@ -243,7 +205,7 @@ impl AuditReport {
             sections,
             by_distance,
             reference: None,
-            worst: worst(audit, total.worst.clone().sorted()),
+            worst: worst::rays(audit, total.worst.clone().sorted()),
         }
     }
 
@@ -353,7 +315,7 @@ fn distances(tallies: &[Tally]) -> Vec<DistanceFigures> {
 fn bars([interpolated, traced]: [Histogram; 2]) -> Vec<Bar> {
     let half_decade = |magnitude: f64| (2.0 * magnitude.log10()).ceil() as i32;
     let of = |histogram: &Histogram| -> Vec<(i32, u64)> {
-        histogram.bins().map(|(edge, count)| (half_decade(edge), count)).collect()
+        histogram.bins().map(|([_, edge], count)| (half_decade(edge), count)).collect()
     };
     let (interpolated_bins, traced_bins) = (of(&interpolated), of(&traced));
     let all = || interpolated_bins.iter().chain(&traced_bins).map(|bin| bin.0);
@@ -372,60 +334,4 @@ fn bars([interpolated, traced]: [Histogram; 2]) -> Vec<Bar> {
         });
     }
     bars
-}
-
-/// See [`WorstRay::rounding_mm`].
-fn rounding_mm(body: &Body, ray: &Segment) -> Option<f64> {
-    let mesh = body.convexity().ok()?;
-    let shift_mm = rounding_shift_mm(body, ray);
-    Some(length_in_parallel_body(mesh, ray, shift_mm) - length_in_parallel_body(mesh, ray, -shift_mm))
-}
-
-fn worst(audit: &Audit, suspects: Vec<Suspect>) -> Vec<WorstRay> {
-    let ranked = suspects.into_iter().enumerate();
-    ranked.filter_map(|(i, suspect)| worst_ray(audit, i + 1, &suspect)).collect()
-}
-
-fn worst_ray(audit: &Audit, rank: usize, suspect: &Suspect) -> Option<WorstRay> {
-    let (source, path) = audit.shot(suspect.origin)?;
-    let organ = &audit.scene.organs[suspect.organ].name;
-    let pixel = match suspect.origin {
-        Origin::Pixel { view, column, row } => Some([view as u32, column, row]),
-        Origin::Line(_) => None,
-    };
-    let place = match (suspect.origin, &audit.settings().rays) {
-        (Origin::Pixel { view, .. }, RaySet::Views(views)) => views.get(view)?.label(),
-        (Origin::Line(line), _) => format!("line {line}"),
-        _ => String::new(),
-    };
-    // An image's engine sees a vertex as the image rounds it: its pixels are found again in the image.
-    let needs_image = audit.method.needs_image(suspect.organ) || audit.against.needs_image(suspect.organ);
-    let ray = match pixel.filter(|_| needs_image) {
-        Some([view, column, row]) => format!("--pixel {view},{column},{row}"),
-        None => format!("--ray={},{},{},{},{},{}", source.x, source.y, source.z, path.x, path.y, path.z),
-    };
-    Some(WorstRay {
-        rank,
-        organ: organ.clone(),
-        error_mm: suspect.method_mm - suspect.reference_mm,
-        method_mm: suspect.method_mm,
-        reference_mm: suspect.reference_mm,
-        found: if suspect.found == Found::Interpolated { "interpolated" } else { "traced" },
-        cell_depth: audit.method.depth(suspect.organ, &suspect.ray),
-        rounding_mm: rounding_mm(&audit.scene.organs[suspect.organ].body, &suspect.ray),
-        place,
-        pixel,
-        source_mm: source.to_array(),
-        path_mm: path.to_array(),
-        reproduce: format!("{ray} --organ {}", shell_word(organ)),
-    })
-}
-
-/// A word as a shell takes it.
-pub fn shell_word(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.,:=/+".contains(c);
-    if !word.is_empty() && word.chars().all(is_plain) {
-        return word.into();
-    }
-    format!("'{}'", word.replace('\'', r"'\''"))
 }

@@ -298,6 +298,31 @@ fn the_mesh_lies_under_its_shape_by_no_more_than_its_depth_allows_and_exact_meth
 }
 
 #[test]
+fn rays_to_recompute_are_the_worst_and_some_that_meet_each_organ() {
+    let scene = scene();
+    let audit = Audit::new(&scene, settings(&scene, Method::Exact(None))).expect("an audit");
+    let report = audit.run(&Control::none()).expect("a report");
+    let sample = audit.reference_sample(&report, 50);
+    let worst = |organ: usize| report.worst.iter().filter(|w| w.organ == scene.organs[organ].name).count();
+    for (organ, rays) in sample {
+        assert!(rays.len() > worst(organ) && rays.len() <= worst(organ) + 50, "{}", rays.len());
+        assert!(rays.iter().all(|ray| exact(&scene.organs[organ].body, ray) > 0.0));
+    }
+}
+
+#[test]
+fn exact_engines_agree_on_adversarial_lines_but_for_what_rounding_explains() {
+    let scene = scene();
+    let rays = RaySet::Adversarial { rays: 300, seed: 3 };
+    let settings = AuditSettings { rays, ..settings(&scene, Method::Exact(Some(Engine::Bvh))) };
+    let report =
+        Audit::new(&scene, settings).and_then(|audit| audit.run(&Control::none())).expect("a report");
+    assert!(report.max_mm() < 1e-6, "{:?}", report.worst.first());
+    assert_eq!(report.sections.len(), Aim::ALL.len());
+    assert!(report.sections.iter().all(|aim| aim.length_mm.compared > 100));
+}
+
+#[test]
 fn lines_for_an_engine_of_images_and_tolerances_that_are_none_are_refused() {
     let scene = scene();
     let views = settings(&scene, Method::Exact(Some(Engine::Raster)));

@@ -11,6 +11,7 @@
 
 mod base64;
 mod csv;
+mod definitions;
 mod page;
 mod panels;
 mod plot;
