@@ -10,7 +10,7 @@
 //!                frames)  convex?)    bvh)   ritree<Attribute> ◄── linespace (s, t, u, v)
 //!                                       │    │ queries
 //!                                       ▼    ▼
-//!                                  modes: project ─► output (images, records)
+//!                                  modes: project, audit ─► output (images, records, reports)
 //! ```
 //!
 //! The picture shows the way of the data. Imports run from the parts to the whole: `geometry` knows no room, `exact` and

@@ -4,7 +4,7 @@ use std::io::{self, IsTerminal, Write};
 use std::process::ExitCode;
 
 use chordfield::Error;
-use chordfield::cli::{self, Session, args::Cli};
+use chordfield::cli::{self, Outcome, Session, args::Cli};
 use clap::Parser;
 use miette::{GraphicalReportHandler, GraphicalTheme};
 
@@ -15,7 +15,13 @@ fn main() -> ExitCode {
         return fail(&error);
     }
     match cli::run(&cli, &session, &mut io::stdout().lock()) {
-        Ok(outcome) => ExitCode::from(outcome.exit_code()),
+        Ok(outcome) => {
+            if let Outcome::LimitBroken(words) = &outcome {
+                // Nobody is left to tell if standard error is gone; the exit code tells.
+                let _ = writeln!(io::stderr().lock(), "{words}");
+            }
+            ExitCode::from(outcome.exit_code())
+        }
         // Whoever read our output has seen enough (`| head`).
         Err(Error::Io { source, .. }) if source.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
         Err(error) => fail(&error),

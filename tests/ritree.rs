@@ -74,7 +74,7 @@ fn the_error_falls_with_the_threshold_and_tracing_with_the_depth() {
         let projector = projector(&scene, TreeSettings { parameters, ..TreeSettings::default() });
         let projection = view(&projector, &scene, 0);
         assert_eq!(projector.spot_check(&[], 1, 3), None, "no views, nothing to compare");
-        let error = projector.spot_check(&views[..1], 20_000, 3).expect("trees").mean_mm;
+        let error = projector.spot_check(&views[..1], 20_000, 3).expect("trees").mean;
         let traced = projection.found().iter().filter(|&&found| found == Found::Traced).count();
         (error, traced)
     };

@@ -1,11 +1,14 @@
 //! What can be said on the command line.
 
+mod audit;
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::output::png::Polarity;
 use crate::physics::DetectorResponse;
+pub use audit::{AuditArgs, RayArgs};
 
 /// Exact intersection lengths of rays with organs: projection images of phantoms, with their numbers.
 ///
@@ -32,6 +35,8 @@ pub struct Cli {
 pub enum Command {
     /// Project a scene: radiographs to look at, lengths and attenuation to compute with.
     Project(Box<ProjectArgs>),
+    /// Say how wrong lengths are: each ray against exact clipping, by organ, kind of error and place.
+    Audit(Box<AuditArgs>),
     /// Say whether scenes or mesh files can be projected, and if not, what to do about it.
     Check(CheckArgs),
     /// The phantoms that come with the program.
@@ -85,6 +90,11 @@ pub struct ProjectArgs {
     #[command(flatten)]
     pub method: MethodArgs,
 
+    /// RI-tree: also write the map of traced pixels: white where any organ with a tree was traced, grey where all were
+    /// interpolated.
+    #[arg(long)]
+    pub map: bool,
+
     /// The values of p shown as darkest and lightest; found from the image if left out.
     #[arg(long, value_name = "LOW..HIGH", value_parser = parse_window, allow_hyphen_values = true)]
     pub window: Option<[f64; 2]>,
@@ -124,10 +134,6 @@ pub struct MethodArgs {
     /// RI-tree: bodies with fewer face planes are clipped instead.
     #[arg(long, value_name = "N", default_value_t = 48)]
     pub tree_planes: usize,
-    /// RI-tree: also write the map of traced pixels: white where any organ with a tree was traced, grey where all were
-    /// interpolated.
-    #[arg(long)]
-    pub map: bool,
 }
 
 /// A method as an argument.
@@ -201,6 +207,21 @@ pub struct BeamArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Photons (in place of the scene's)")]
 pub struct PhotonArgs {
+    /// Their energies and the detector.
+    #[command(flatten)]
+    pub source: SourceArgs,
+    /// Photons that would reach each pixel through air; turns Poisson noise on.
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub photons: Option<f64>,
+    /// The seed of the noise.
+    #[arg(long, default_value_t = 0, requires = "photons")]
+    pub seed: u64,
+}
+
+/// Changes to the scene's `[spectrum]`.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Photons (in place of the scene's)")]
+pub struct SourceArgs {
     /// One energy, keV.
     #[arg(long = "energy-kev", value_name = "KEV", allow_negative_numbers = true, conflicts_with = "kvp")]
     pub energy_kev: Option<f64>,
@@ -210,12 +231,6 @@ pub struct PhotonArgs {
     /// What the detector makes of a photon.
     #[arg(long, value_enum)]
     pub response: Option<ResponseArg>,
-    /// Photons that would reach each pixel through air; turns Poisson noise on.
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    pub photons: Option<f64>,
-    /// The seed of the noise.
-    #[arg(long, default_value_t = 0, requires = "photons")]
-    pub seed: u64,
 }
 
 /// `check`.

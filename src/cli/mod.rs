@@ -1,6 +1,7 @@
 //! The command line: from words to the library and back to words.
 
 pub mod args;
+mod audit;
 mod check;
 mod phantom;
 mod project;
@@ -22,6 +23,7 @@ pub use session::Session;
 pub fn run(cli: &Cli, session: &Session, out: &mut dyn Write) -> Result<Outcome> {
     match &cli.command {
         Command::Project(args) => project::run(args, session, out).map(|()| Outcome::Done),
+        Command::Audit(args) => audit::run(args, session, out),
         Command::Check(args) => check::run(args, out),
         Command::Phantom(command) => phantom::run(command, session, out).map(|()| Outcome::Done),
         Command::Completions { shell } => {
@@ -33,19 +35,22 @@ pub fn run(cli: &Cli, session: &Session, out: &mut dyn Write) -> Result<Outcome>
 }
 
 /// How a command ended that was not stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// All was done.
     Done,
     /// `check` found input that cannot be used; it said so on standard output.
     Refused,
+    /// `audit` found an error beyond the limit: what is to be said of it.
+    LimitBroken(String),
 }
 
 impl Outcome {
     /// The process's exit code.
-    pub fn exit_code(self) -> u8 {
+    pub fn exit_code(&self) -> u8 {
         match self {
             Self::Done => 0,
+            Self::LimitBroken(_) => 1,
             Self::Refused => 2,
         }
     }

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
-use super::args::{BeamArgs, BeamKindArg, MethodArg, MethodArgs, PhotonArgs, Product, ProjectArgs};
+use super::args::{BeamArgs, BeamKindArg, MethodArg, MethodArgs, Product, ProjectArgs, SourceArgs};
 use super::{Session, print};
 use crate::error::{Error, Result};
 use crate::exact::Engine;
@@ -30,7 +30,7 @@ const SPOT_CHECK_RAYS: usize = 20_000;
 pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result<()> {
     let mut stages = Stages::start();
     let mut scene = open(&args.scene)?;
-    change(&mut scene, &args.beam, &args.photons)?;
+    change(&mut scene, &args.beam, &args.photons.source)?;
     let views = scene.beam.views()?;
     let labels = labels(&scene.name, &views);
     let noise = args.photons.photons.map(|n| PhotonNoise::new(n, args.photons.seed)).transpose()?;
@@ -43,7 +43,7 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
     remove_stale(&record)?;
     stages.end("load");
 
-    let rays: u64 = views.iter().map(pixels).sum();
+    let rays: u64 = views.iter().map(View::pixels).sum();
     let bar = session.progress(rays, "rays");
     bar.set_message(scene.name.clone());
     let advance = |rays| bar.inc(rays);
@@ -97,7 +97,7 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
 }
 
 /// Removes an earlier run's record, which would describe files that are about to change.
-fn remove_stale(record: &Path) -> Result<()> {
+pub fn remove_stale(record: &Path) -> Result<()> {
     match std::fs::remove_file(record) {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io("replace", record, e)),
         _ => Ok(()),
@@ -124,7 +124,7 @@ pub fn open(scene: &str) -> Result<Scene> {
 }
 
 /// Puts what the command line says in place of what the scene says.
-fn change(scene: &mut Scene, beam: &BeamArgs, photons: &PhotonArgs) -> Result<()> {
+pub fn change(scene: &mut Scene, beam: &BeamArgs, photons: &SourceArgs) -> Result<()> {
     scene.beam = scene.beam.clone().overridden_by(beam_spec(beam)?);
     if let Some(energy) = photons.energy_kev {
         scene.replace_source(Spectrum::mono(energy)?)?;
@@ -177,7 +177,7 @@ fn products(args: &ProjectArgs) -> Products {
         transmission: has(Product::Transmission),
         line_integral: has(Product::P),
         lengths: has(Product::Lengths),
-        map: args.method.map,
+        map: args.map,
         npy: args.npy,
         window: args.window,
         polarity: args.polarity.into(),
@@ -197,11 +197,20 @@ fn tree_summary(
         settings,
         queries,
         trees,
-        sampled_error: projector.spot_check(views, SPOT_CHECK_RAYS, 1),
+        sampled_error_mm: projector.spot_check(views, SPOT_CHECK_RAYS, 1),
     })
 }
 
-fn method(args: &MethodArgs) -> Result<Method> {
+/// The method that the arguments name.
+///
+/// # Errors
+/// A number that does not serve.
+pub fn method(args: &MethodArgs) -> Result<Method> {
+    method_named(args.method, args)
+}
+
+/// As [`method`], for another name with the same settings.
+pub fn method_named(name: MethodArg, args: &MethodArgs) -> Result<Method> {
     let refuse = |name: &str, value: f64, remedy: &str| {
         Err(Error::input(name, format!("{value} does not serve"), remedy))
     };
@@ -217,7 +226,7 @@ fn method(args: &MethodArgs) -> Result<Method> {
     if !(0.0..=1.0).contains(&args.prune_keep) {
         return refuse("--prune-keep", args.prune_keep, "give a share from 0 to 1");
     }
-    Ok(match args.method {
+    Ok(match name {
         MethodArg::Exact => Method::Exact(None),
         MethodArg::Clip => Method::Exact(Some(Engine::Clip)),
         MethodArg::Walk => Method::Exact(Some(Engine::Walk)),
@@ -261,11 +270,6 @@ fn labels(scene: &str, views: &[View]) -> Vec<String> {
         .enumerate()
         .map(|(i, label)| if is_repeated(label) { format!("{label}-{i:03}") } else { label.clone() })
         .collect()
-}
-
-fn pixels(view: &View) -> u64 {
-    let (columns, rows) = view.size();
-    u64::from(columns) * u64::from(rows)
 }
 
 /// Wall-clock time by stage.

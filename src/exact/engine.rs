@@ -35,6 +35,16 @@ mod cost {
 }
 
 impl Engine {
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Clip => "clip",
+            Self::Walk => "walk",
+            Self::Raster => "raster",
+            Self::Bvh => "bvh",
+        }
+    }
+
     /// Whether the engine can find chords in `body`. Clipping and walking need a convex one.
     pub fn serves(self, body: &Body) -> bool {
         match self {

@@ -1,4 +1,4 @@
-//! What tests hold engines against: the chords of the bodies parallel to a convex one.
+//! What engines are held against, by tests and audits: the chords of the bodies parallel to a convex one.
 
 use crate::geometry::{ConvexMesh, Interval, Segment};
 

@@ -18,8 +18,7 @@ pub mod bvh;
 pub mod clip;
 mod crossing;
 mod engine;
-#[cfg(test)]
-mod judge;
+pub(crate) mod judge;
 mod parts;
 pub mod raster;
 pub mod rational;

@@ -78,8 +78,14 @@ pub struct Segment {
 impl Segment {
     /// The path from `source` to `target`, mm. `None` if they coincide or are not finite.
     pub fn between(source: DVec3, target: DVec3) -> Option<Self> {
-        let line = Line::new(source, UnitDir::new(target - source)?)?;
-        let length_mm = (target - source).length();
+        Self::along(source, target - source)
+    }
+
+    /// The path from `source` to `source + path`, mm; the same bits as [`between`](Self::between) gives for a target that
+    /// is `path` away. `None` if the path is zero or something is not finite.
+    pub fn along(source: DVec3, path: DVec3) -> Option<Self> {
+        let line = Line::new(source, UnitDir::new(path)?)?;
+        let length_mm = path.length();
         (length_mm.is_finite() && length_mm > 0.0).then_some(Self { line, length_mm })
     }
 

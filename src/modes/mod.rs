@@ -1,6 +1,8 @@
 //! What can be done with a scene. Modes return values; they print nothing and write no files.
 
+pub mod audit;
 mod control;
+pub mod figures;
 pub mod oracles;
 pub mod project;
 pub mod reference;

@@ -3,11 +3,13 @@
 //! ```text
 //! Projection ─► projection ─► png (to look at) │ metaimage, npy (to compute with)
 //! Scene      ─► phantom    ─► obj
+//! AuditReport ─► audit     ─► html, csv
 //! any record ─► json
 //!                  └─► atomic: temporary file beside the target ─► flush ─► sync ─► rename
 //! ```
 
 pub mod atomic;
+pub mod audit;
 pub mod image;
 pub mod json;
 pub mod metaimage;

@@ -176,13 +176,31 @@ fn write_colour<P: Pixel<Subpixel = u8>>(
     colour: ColorType,
     labels: Labels,
 ) -> Result<u64> {
-    write_atomically(path, |out| {
-        let mut encoder = labelled_encoder(out, image.dimensions(), &[], labels)?;
-        encoder.set_color(colour);
-        encoder.set_depth(BitDepth::Eight);
-        encoder.set_source_srgb(SrgbRenderingIntent::RelativeColorimetric);
-        write_rows(encoder, image, |row, bytes| bytes.extend(row))
-    })
+    write_atomically(path, |out| encode_colour(out, image, colour, labels))
+}
+
+/// Encodes an image of 8-bit sRGB colours as the bytes of a PNG without labels, for a page that holds it.
+///
+/// # Errors
+/// If the image has no pixels.
+pub fn rgb_bytes(image: &RgbImage) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    encode_colour(&mut bytes, image, ColorType::Rgb, Labels::default())
+        .map_err(|e| Error::io("write", Path::new("an image as PNG"), e))?;
+    Ok(bytes)
+}
+
+fn encode_colour<P: Pixel<Subpixel = u8>>(
+    out: &mut dyn Write,
+    image: &ImageBuffer<P, Vec<u8>>,
+    colour: ColorType,
+    labels: Labels,
+) -> io::Result<()> {
+    let mut encoder = labelled_encoder(out, image.dimensions(), &[], labels)?;
+    encoder.set_color(colour);
+    encoder.set_depth(BitDepth::Eight);
+    encoder.set_source_srgb(SrgbRenderingIntent::RelativeColorimetric);
+    write_rows(encoder, image, |row, bytes| bytes.extend(row))
 }
 
 fn labelled_encoder<'a>(

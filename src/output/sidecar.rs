@@ -6,7 +6,8 @@ use serde::Serialize;
 
 use super::projection::WrittenFile;
 use crate::exact::Engine;
-use crate::modes::project::{ForestReport, QueryCounts, RayCounts, SampledError, TreeSettings};
+use crate::modes::figures::Figures;
+use crate::modes::project::{ForestReport, QueryCounts, RayCounts, TreeSettings};
 use crate::physics::{PhotonNoise, Spectrum};
 use crate::scene::organ::{Organ, Origin};
 use crate::scene::{Pose, Scene, View};
@@ -230,7 +231,7 @@ pub struct TreeSummary {
     /// What they are made of and what building took.
     pub trees: ForestReport,
     /// Errors of interpolated lengths on a seeded sample of the run's rays, mm.
-    pub sampled_error: Option<SampledError>,
+    pub sampled_error_mm: Option<Figures>,
 }
 
 impl Sidecar {

@@ -94,11 +94,16 @@ impl<A: Attribute> RiTree<A> {
     ///
     /// Cells on the way that do not exist yet are made and kept while `cache` has room.
     pub fn query(&self, line: LinePoint, cache: &Cache) -> Option<Answer<A::Output>> {
+        self.query_with_depth(line, cache).map(|(answer, _)| answer)
+    }
+
+    /// As [`query`](Self::query), with the depth of the final cell that answers: a function of the line alone, too.
+    pub fn query_with_depth(&self, line: LinePoint, cache: &Cache) -> Option<(Answer<A::Output>, u32)> {
         let line =
             if self.attribute.is_symmetric() && line.pair.is_reversed() { line.reversed() } else { line };
         if !line.stuv.iter().all(|x| x.is_finite()) {
             // Overflow on the way to box units says nothing about the line.
-            return Some(Answer::Trace(Reason::Guard));
+            return Some((Answer::Trace(Reason::Guard), 0));
         }
         if !is_in_range(&line.stuv) {
             return None;
@@ -110,7 +115,7 @@ impl<A: Attribute> RiTree<A> {
         loop {
             if let Some(leaf) = node.leaf() {
                 leaf.touch(self.clock.load(Ordering::Relaxed));
-                return Some(self.answer(&place, leaf, line.stuv));
+                return Some((self.answer(&place, leaf, line.stuv), place.depth));
             }
             if node.halves().is_none() {
                 match node.expand(&place, self, cache) {
@@ -146,11 +151,13 @@ impl<A: Attribute> RiTree<A> {
         mut place: Place,
         corners: Option<Box<cell::Corners<A::Output>>>,
         stuv: [f64; 4],
-    ) -> Answer<A::Output> {
+    ) -> (Answer<A::Output>, u32) {
         let mut corners = corners.map_or_else(|| self.sample_corners(&place), |c| *c);
         loop {
             match self.verdict(&place, &corners) {
-                Verdict::Final(kind) => return self.answer(&place, &Leaf::new(kind, corners, 0), stuv),
+                Verdict::Final(kind) => {
+                    return (self.answer(&place, &Leaf::new(kind, corners, 0), stuv), place.depth);
+                }
                 Verdict::Split => {
                     let side = place.side_of(&stuv);
                     let [lower, upper] = self.split(&place, &corners);

@@ -161,6 +161,11 @@ impl View {
         (self.panel.columns, self.panel.rows)
     }
 
+    /// How many pixels there are.
+    pub fn pixels(&self) -> u64 {
+        u64::from(self.panel.columns) * u64::from(self.panel.rows)
+    }
+
     /// Distance of neighbouring pixel centres along a row and along a column, mm at the detector.
     pub fn spacing_mm(&self) -> (f64, f64) {
         (self.panel.column_step_mm.length(), self.panel.row_step_mm.length())

@@ -207,6 +207,12 @@ impl<'a> Grove<'_, 'a> {
             Some(Answer::Trace(reason)) => Err(reason),
         }
     }
+
+    /// The depth of the cell that answers a line. `None` if the line passes the body's box by.
+    pub fn depth(&self, tree: &RiTree<ChordLength>, segment: &Segment) -> Option<u32> {
+        let point = tree.attribute().space().point_of(segment.line());
+        tree.query_with_depth(point, &self.forest.cache).map(|(_, depth)| depth)
+    }
 }
 
 /// Whether the whole box lies between the segment's ends, so that its line's chord is its own.

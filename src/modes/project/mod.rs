@@ -26,13 +26,23 @@ use crate::geometry::Region;
 use crate::physics::{Attenuator, PhotonNoise};
 use crate::scene::{Scene, View};
 pub use forest::{ForestReport, QueryCounts, TreeSettings};
-pub use spot_check::SampledError;
 
 use forest::Forest;
 use tile::TileTracer;
 
 /// Side of a tile, pixels: its rays' lengths for a few organs fit the second-level cache, and 1024² pixels make 256 tiles.
 const TILE: u32 = 64;
+
+/// The tiles of an image, row by row.
+pub(super) fn tiles((columns, rows): (u32, u32)) -> Vec<Region> {
+    let part = |start: u32, end: u32| start..(start + TILE).min(end);
+    let tops = (0..rows).step_by(TILE as usize);
+    tops.flat_map(|top| {
+        let lefts = (0..columns).step_by(TILE as usize);
+        lefts.map(move |left| Region { columns: part(left, columns), rows: part(top, rows) })
+    })
+    .collect()
+}
 
 /// Which values a projection is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,6 +63,16 @@ pub enum Method {
     Exact(Option<Engine>),
     /// By one RI-tree per convex organ, whose samples are exact chords; what it does not interpolate is exact.
     RiTree(TreeSettings),
+}
+
+impl Method {
+    /// Its name, as on the command line.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Exact(engine) => engine.map_or("exact", Engine::name),
+            Self::RiTree(_) => "ritree",
+        }
+    }
 }
 
 /// A scene made ready to be projected: the organs before one spectrum, and what is wanted of them.
@@ -122,15 +142,8 @@ impl<'a> Projector<'a> {
     /// [`Error::Interrupted`](crate::Error::Interrupted) within a tile's time of a request to stop.
     pub fn project(&self, view: &View, view_index: u64, control: &Control) -> Result<Projection> {
         let (columns, rows) = view.size();
-        let across = (0..columns).step_by(TILE as usize).map(|c| c..(c + TILE).min(columns));
-        let regions: Vec<Region> = (0..rows)
-            .step_by(TILE as usize)
-            .flat_map(|r| {
-                across.clone().map(move |columns| Region { columns, rows: r..(r + TILE).min(rows) })
-            })
-            .collect();
         let tracer = TileTracer::new(self, view, view_index);
-        let tiles: Vec<Tile> = regions
+        let tiles: Vec<Tile> = tiles(view.size())
             .into_par_iter()
             .map(|region| {
                 control.check()?;

@@ -2,40 +2,25 @@
 
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
-use serde::Serialize;
 
 use super::Projector;
 use super::forest::holds_box;
 use crate::exact::Engine;
 use crate::geometry::Interval;
+use crate::modes::audit::DEFAULT_TOLERANCE_MM;
+use crate::modes::figures::{Figures, Tally};
 use crate::scene::View;
 
-/// Errors of interpolated lengths against exact ones, mm, over sampled rays and organs that one of the two says are met.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct SampledError {
-    /// Lengths compared: interpolated ones only, since traced ones are exact.
-    pub compared: usize,
-    /// The mean exact length.
-    pub mean_length_mm: f64,
-    /// The mean of |error|.
-    pub mean_mm: f64,
-    /// Half of the errors are no larger.
-    pub p50_mm: f64,
-    /// 99 % of the errors are no larger.
-    pub p99_mm: f64,
-    /// 99.9 % of the errors are no larger.
-    pub p999_mm: f64,
-    /// The largest.
-    pub max_mm: f64,
-}
-
 impl Projector<'_> {
-    /// Compares `rays` random pixels' rays of the views, all organs each. `None` without trees or without views.
-    pub fn spot_check(&self, views: &[View], rays: usize, seed: u64) -> Option<SampledError> {
+    /// Errors of interpolated lengths against exact ones, mm, over `rays` random pixels' rays of the views and all organs that
+    /// one of the two says are met; traced lengths are exact and not compared. `None` without trees or without views.
+    ///
+    /// A glance at each run; [`audit`](crate::modes::audit) looks at every ray and at the other kinds of error.
+    pub fn spot_check(&self, views: &[View], rays: usize, seed: u64) -> Option<Figures> {
         let grove = self.forest.as_ref().filter(|_| !views.is_empty())?.enter();
         let mut rng = Pcg64::seed_from_u64(seed);
         let mut below = |n: u64| rng.next_u64() % n.max(1);
-        let (mut errors, mut total) = (Vec::new(), 0.0);
+        let mut errors = Tally::new(DEFAULT_TOLERANCE_MM);
         let mut parts = Vec::new();
         for _ in 0..rays {
             let view = &views[below(views.len() as u64) as usize];
@@ -59,22 +44,10 @@ impl Projector<'_> {
                 }
                 let exact = length_by(&|parts| body.chords_by(Engine::Clip, ray.line(), parts));
                 if exact > 0.0 || near > 0.0 {
-                    errors.push((near - exact).abs());
-                    total += exact;
+                    errors.add(near - exact, exact);
                 }
             }
         }
-        errors.sort_unstable_by(f64::total_cmp);
-        let count = errors.len().max(1) as f64;
-        let quantile = |q: f64| errors.get((q * (count - 1.0)).ceil() as usize).copied().unwrap_or(0.0);
-        Some(SampledError {
-            compared: errors.len(),
-            mean_length_mm: total / count,
-            mean_mm: errors.iter().sum::<f64>() / count,
-            p50_mm: quantile(0.5),
-            p99_mm: quantile(0.99),
-            p999_mm: quantile(0.999),
-            max_mm: errors.last().copied().unwrap_or(0.0),
-        })
+        Some(errors.figures(true))
     }
 }
