@@ -34,6 +34,11 @@ pub struct AuditArgs {
     #[arg(long = "limit-mm", value_name = "MM", value_parser = parse_limit)]
     pub limit_mm: Option<f64>,
 
+    /// In place of a comparison: hold the method to identities and integrals that need no second engine. Exit with 1 if one
+    /// fails.
+    #[arg(long, conflicts_with_all = ["against", "output", "limit_mm"])]
+    pub oracles: bool,
+
     /// Which rays are looked along.
     #[command(flatten)]
     pub rays: RayArgs,

@@ -26,6 +26,7 @@ mod optics;
 mod outline;
 mod picture;
 mod rays;
+mod reference;
 mod report;
 #[cfg(test)]
 mod tests;
@@ -50,9 +51,8 @@ use worst::Origin;
 pub use compare::SILHOUETTE_SHARE;
 pub use picture::Pictures;
 pub use rays::{Aim, RaySet};
-pub use report::{
-    AuditReport, Bar, DistanceFigures, KindFigures, OrganFigures, RayWords, ReferenceError, SectionFigures,
-};
+pub use reference::ReferenceError;
+pub use report::{AuditReport, Bar, DistanceFigures, KindFigures, OrganFigures, RayWords, SectionFigures};
 pub use worst::{WorstRay, shell_word};
 
 /// The tolerance of an audit that names none, mm: half a millimetre of soft tissue changes T by 1 %, about the noise of a
@@ -191,7 +191,9 @@ impl<'a> Audit<'a> {
                 }
             }
         }
-        Ok(AuditReport::new(self, total, sections))
+        let mut report = AuditReport::new(self, total, sections);
+        report.reference = self.reference_error(&report);
+        Ok(report)
     }
 
     /// Both answers to a single ray in an organ: for a ray of the audit the same numbers, to the last bit.

@@ -6,6 +6,7 @@ use super::compare::closed_form;
 use super::finder::Reference;
 use super::ledger::{KindLedger, Ledger, OrganLedger};
 use super::outline;
+use super::reference::ReferenceError;
 use super::worst::{self, WorstRay};
 use super::{Audit, RaySet, SILHOUETTE_SHARE, TRANSMISSION_TOLERANCE};
 use crate::modes::figures::{Figures, Histogram, Tally};
@@ -72,19 +73,6 @@ pub struct RayWords {
     pub seed: Option<u64>,
     /// How many rays.
     pub count: u64,
-}
-
-/// The error of the f64 reference itself, on a sample of rays recomputed without rounding.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct ReferenceError {
-    /// Rays recomputed.
-    pub rays: u64,
-    /// The mean error, units in the last place of the length.
-    pub mean_ulps: f64,
-    /// The largest.
-    pub max_ulps: f64,
-    /// The largest, mm.
-    pub max_mm: f64,
 }
 
 /// Errors of one kind.

@@ -80,6 +80,7 @@ impl<'a> Oracles<'a> {
                 let mut verdicts = oracles.question(&organ.name, &organ.body);
                 let parent = organ.parent.map(|parent| &scene.organs[parent]);
                 verdicts.extend(parent.map(|parent| bodies::nesting(&oracles, organ, parent)));
+                control.advance(1);
                 Ok(verdicts)
             })
             .collect::<Result<_>>()?;

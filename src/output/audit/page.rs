@@ -103,9 +103,14 @@ fn tiles(report: &AuditReport) -> String {
         ));
     }
     if let Some(reference) = report.reference {
-        let words =
-            format!("the reference's own largest error on {} rays in exact arithmetic", reference.rays);
-        all.push(tile(format!("{} ulp", short(reference.max_ulps)), words));
+        let words = format!(
+            "the reference's own largest error on {} lengths recomputed in rationals: {} units in the last place of \
+             the distance, {} on average",
+            reference.lengths,
+            short(reference.max_ulps_of_distance),
+            short(reference.mean_ulps_of_distance),
+        );
+        all.push(tile(format!("{} mm", short(reference.max_mm)), words));
     }
     format!("<div class=\"tiles\">{}</div>", all.concat())
 }
