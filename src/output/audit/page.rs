@@ -194,7 +194,7 @@ fn histogram(bars: &[Bar]) -> String {
     let svg = plot.svg();
     let zeros = zero.map_or(String::new(), |bar| {
         format!(
-            "<p class=\"note\">Without any error: {} interpolated (among them cells proved empty), {} traced.</p>",
+            "<p class=\"note\">Without any error: {} interpolated, {} traced.</p>",
             grouped(bar.interpolated),
             grouped(bar.traced)
         )
