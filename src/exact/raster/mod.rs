@@ -42,7 +42,8 @@ use crate::geometry::{ClosedMesh, RayGrid, Region, Upstream};
 
 /// A closed surface made ready for the rays of one grid.
 ///
-/// Crossings are exact for a surface whose vertices have moved by rounding: see [`place_error`](Projection::place_error).
+/// Crossings are exact for a surface whose vertices have moved by rounding: by γ₉₆ of the distance to the source, in pixels,
+/// over the share of the way they are at (`projection::Projection::place_error`).
 /// What a ray meets does not depend on the region that it is asked in, to the last bit, nor does the order of its
 /// crossings.
 #[derive(Clone, Debug)]
