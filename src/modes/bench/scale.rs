@@ -3,13 +3,14 @@
 //! | study | scene | image |
 //! |---|---|---|
 //! | faces | one ellipsoid of ever more faces | one view, 600 × 600 |
-//! | pixels | one ellipsoid of 20 000 faces | one view, ever finer |
+//! | pixels | one ellipsoid of 20 000 faces | one square view, ever finer |
 //! | views | one ellipsoid of 5 000 faces | an orbit of ever more views, 256 × 256 |
 //! | organs | ever more ellipsoids of 2 000 faces on a grid | one view, 600 × 600 |
 //! | threads | 27 ellipsoids of 5 000 faces | one view, 1024 × 1024 |
-//! | cache | 27 ellipsoids of 2 000 faces, in trees | four views, 256 × 256 |
+//! | cache | one ellipsoid of 2 000 faces, in a tree | one view, 256 × 256 |
 //!
-//! Exponents are slopes of straight lines through the logarithms, by least squares: cost ∝ size^exponent.
+//! Exponents are slopes of straight lines through the logarithms of the upper half of the sizes, by least squares: cost ∝
+//! size^exponent. Where a run would take a minute is told by the straight line through the last two sizes' times.
 
 use std::time::Instant;
 
@@ -94,7 +95,8 @@ pub struct Fit {
     pub cold_exponent: f64,
     /// The same once warm.
     pub warm_exponent: f64,
-    /// The size at which a run from cold takes a minute, by the growth between the last two sizes. None where it shrinks.
+    /// The size at which a run from cold takes a minute, if every further unit costs what it did between the last two sizes.
+    /// None where cost shrinks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_at_a_minute: Option<f64>,
     /// The size at which the scene fills the memory that the system has left, at the last size's bytes per unit.
@@ -111,6 +113,8 @@ struct Plan {
     quick_sizes: usize,
     scene: fn(u32) -> String,
     contenders: fn(u32) -> Vec<Contender>,
+    /// What grows, in its own unit.
+    measure: fn(u32) -> f64,
     /// The threads at a size, if they are what grows.
     threads: Option<fn(u32) -> usize>,
     is_fitted: bool,
@@ -124,16 +128,18 @@ const PLANS: [Plan; 6] = [
         quick_sizes: 3,
         scene: |faces| scene_text(1, faces, 600, "0"),
         contenders: |_| all(),
+        measure: f64::from,
         threads: None,
         is_fitted: true,
     },
     Plan {
-        name: "pixels a side",
+        name: "pixels",
         setup: "one ellipsoid of 20 000 faces, one view",
         sizes: &[150, 300, 600, 1_200, 2_400],
         quick_sizes: 3,
         scene: |side| scene_text(1, 20_000, side, "0"),
         contenders: |_| all(),
+        measure: |side| f64::from(side) * f64::from(side),
         threads: None,
         is_fitted: true,
     },
@@ -144,6 +150,7 @@ const PLANS: [Plan; 6] = [
         quick_sizes: 3,
         scene: |views| scene_text(1, 5_000, 256, &format!("0..360:{}", 360.0 / f64::from(views))),
         contenders: |_| all(),
+        measure: f64::from,
         threads: None,
         is_fitted: true,
     },
@@ -154,6 +161,7 @@ const PLANS: [Plan; 6] = [
         quick_sizes: 3,
         scene: |organs| scene_text(organs, 2_000, 600, "0"),
         contenders: |_| all(),
+        measure: f64::from,
         threads: None,
         is_fitted: true,
     },
@@ -164,16 +172,18 @@ const PLANS: [Plan; 6] = [
         quick_sizes: 2,
         scene: |_| scene_text(27, 5_000, 1_024, "0"),
         contenders: |_| all(),
+        measure: f64::from,
         threads: Some(|threads| threads as usize),
         is_fitted: true,
     },
     Plan {
         name: "cache, kB",
-        setup: "27 ellipsoids of 2 000 faces in trees, four views of 256×256",
-        sizes: &[125, 500, 2_000, 8_000, 32_000],
-        quick_sizes: 5,
-        scene: |_| scene_text(27, 2_000, 256, "0..360:90"),
+        setup: "one ellipsoid of 2 000 faces in a tree, one view of 256×256",
+        sizes: &[125, 250, 500, 1_000, 2_000, 4_000, 8_000],
+        quick_sizes: 7,
+        scene: |_| scene_text(1, 2_000, 256, "0"),
         contenders: |kilobytes| vec![with_cache(Contender::paper(0.05), kilobytes)],
+        measure: f64::from,
         threads: None,
         is_fitted: false,
     },
@@ -287,7 +297,7 @@ fn measure(plan: &Plan, settings: &ScaleSettings, control: &Control, study: &mut
         for ((contender, [cold, warm]), tree_bytes) in contenders.iter().zip(&results.times).zip(bytes) {
             if !cold.0.is_empty() {
                 study.rows.push(ScaleRow {
-                    size: size.into(),
+                    size: (plan.measure)(size),
                     options: contender.options(),
                     cold: cold.times(),
                     warm: warm.times(),
@@ -322,18 +332,20 @@ fn fits(rows: &[ScaleRow], available_bytes: Option<u64>) -> Vec<Fit> {
         let points =
             |time: fn(&ScaleRow) -> f64| own.iter().map(move |r| [r.size, time(r)]).collect::<Vec<_>>();
         let cold = points(|row| row.cold.seconds);
-        let cold_exponent = exponent(&cold)?;
-        let last = own.last()?;
-        let growth = exponent(&cold[cold.len() - 2..]).filter(|&e| e > 0.05);
+        let (last, upper) = (own.last()?, own.len() / 2);
+        let upper = upper.min(own.len().saturating_sub(2));
+        let cold_exponent = exponent(&cold[upper..])?;
+        let [[size, seconds], [next_size, next_seconds]] = *cold.last_chunk()?;
+        let per_unit = (next_seconds - seconds) / (next_size - size);
         let size_at_a_minute =
-            growth.map(|e| last.size * (END_OF_PATIENCE_S / last.cold.seconds).powf(1.0 / e));
-        let per_unit = last.scene_bytes.filter(|&bytes| bytes > 1 << 20).map(|b| b as f64 / last.size);
+            (per_unit > 0.0).then(|| next_size + (END_OF_PATIENCE_S - next_seconds) / per_unit);
+        let bytes_each = last.scene_bytes.filter(|&bytes| bytes > 1 << 20).map(|b| b as f64 / last.size);
         Some(Fit {
             options: options.into(),
             cold_exponent,
-            warm_exponent: exponent(&points(|row| row.warm.seconds))?,
+            warm_exponent: exponent(&points(|row| row.warm.seconds)[upper..])?,
             size_at_a_minute,
-            size_at_full_memory: per_unit.zip(available_bytes).map(|(each, all)| all as f64 / each),
+            size_at_full_memory: bytes_each.zip(available_bytes).map(|(each, all)| all as f64 / each),
         })
     };
     options.into_iter().filter_map(fit).collect()
@@ -371,12 +383,12 @@ mod tests {
     }
 
     #[test]
-    fn exponents_and_ends_are_those_of_powers() {
+    fn exponents_are_those_of_powers_and_ends_lie_on_straight_lines() {
         let rows: Vec<ScaleRow> = [1.0, 2.0, 4.0, 8.0].map(|x: f64| row(x, 0.01 * x.powf(1.5))).into();
+        let affine: Vec<ScaleRow> = [1.0, 2.0, 4.0].map(|x: f64| row(x, 1.0 + x)).into();
+        assert!((fits(&affine, None)[0].size_at_a_minute.expect("it grows") - 59.0).abs() < 1e-9);
         let fit = &fits(&rows, Some(1_000_000_000))[0];
         assert!((fit.cold_exponent - 1.5).abs() < 1e-12 && (fit.warm_exponent - 1.5).abs() < 1e-12);
-        let at_a_minute = fit.size_at_a_minute.expect("it grows");
-        assert!((0.01 * at_a_minute.powf(1.5) - 60.0).abs() < 1e-6, "{at_a_minute}");
         assert!((fit.size_at_full_memory.expect("bytes are known") - 100.0).abs() < 1e-6);
         assert!(fits(&rows[..1], None).is_empty(), "one size has no slope");
         let shrinking: Vec<ScaleRow> = [1.0, 2.0].map(|x: f64| row(x, 1.0 / x)).into();

@@ -40,14 +40,14 @@ fn plot(study: &Study) -> Curves<'_> {
         methods.into_iter().map(|m| (m.to_owned(), own(m))).collect()
     };
     let curve = |i: usize, name: &str, rows: &[&ScaleRow], is_warm: bool| Curve {
-        name: format!("{}{}", name.trim_start_matches("--method "), if is_warm { ", warm" } else { "" }),
+        name: if is_warm { String::new() } else { name.trim_start_matches("--method ").into() },
         colour: COLOURS[i % COLOURS.len()],
         points: rows
             .iter()
             .map(|row| Point {
                 x: row.size,
                 y: if is_warm { row.warm.seconds } else { row.cold.seconds },
-                name: study.name.into(),
+                name: format!("{name}, {}", if is_warm { "warm" } else { "cold" }),
             })
             .collect(),
         dashed: is_warm,
@@ -85,7 +85,7 @@ fn section(study: &Study) -> String {
     };
     let rows: String = study.rows.iter().map(row).collect();
     format!(
-        "<p>{}.</p>{}{}<details><summary>All figures</summary><div class=\"wide\"><table><thead><tr><th>{}</th><th>method</th>\
+        "<p>{}. Drawn through: cold; dashed: warm.</p>{}{}<details><summary>All figures</summary><div class=\"wide\"><table><thead><tr><th>{}</th><th>method</th>\
          <th>cold, s</th><th>warm, s</th><th>reading the scene, s</th><th>trees, MB</th></tr></thead><tbody>{rows}</tbody></table></div></details>",
         escape(&study.setup),
         plot(study).html(),
