@@ -13,7 +13,7 @@ use crate::modes::Control;
 use crate::modes::bench::Patience;
 use crate::modes::bench::curve::{self, CurveSettings};
 use crate::modes::bench::scale::{self, ScaleSettings};
-use crate::output::{bench as output, json};
+use crate::output::{bench as output, create_folder, json};
 
 /// A contender leaves its race after so long, seconds, once there are enough rounds for a median.
 const PATIENCE_S: f64 = 3.0;
@@ -59,6 +59,7 @@ fn run_curve(args: &CurveArgs, session: &Session, out: &mut dyn Write) -> Result
         patience: patience(&args.run),
         limit_s: args.limit_s,
     };
+    settings.check(&scene)?;
     let mut report = measure(session, &args.run, curve::turns(&settings), &scene.name, |control| {
         curve::curve(&scene, &settings, control)
     })?;
@@ -86,9 +87,11 @@ fn measure<T>(
     name: &str,
     work: impl FnOnce(&Control) -> Result<T>,
 ) -> Result<T> {
-    if args.output.is_some() {
-        // From here on an interruption ends the measurement, not the program: there is something to write.
+    if let Some(folder) = &args.output {
+        // A folder that cannot be made is better known before the measurement than after it. From here on an interruption
+        // ends the measurement, not the program: there is something to write.
         session.begin_writing();
+        create_folder(folder)?;
     }
     let bar = session.progress(turns, "turns");
     bar.set_message(name.to_owned());

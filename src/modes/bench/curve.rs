@@ -39,6 +39,19 @@ impl CurveSettings {
     }
 }
 
+impl CurveSettings {
+    /// Whether they serve for `scene`.
+    ///
+    /// # Errors
+    /// No sizes, a size that does not serve, a beam without views.
+    pub fn check(&self, scene: &Scene) -> Result<()> {
+        if self.sizes.is_empty() {
+            return Err(Error::input("the curve", "has no sizes", "give one or more"));
+        }
+        self.sizes.iter().try_for_each(|&pixels| views(scene, pixels).map(drop))
+    }
+}
+
 /// What was found.
 #[derive(Clone, Debug, Serialize)]
 pub struct CurveReport {
@@ -103,6 +116,7 @@ pub struct CurveRow {
 /// # Errors
 /// A beam without views, a size that does not serve, an energy off a table.
 pub fn curve(scene: &Scene, settings: &CurveSettings, control: &Control) -> Result<CurveReport> {
+    settings.check(scene)?;
     let mut report = CurveReport {
         program: Program::THIS,
         command: String::new(),
@@ -198,7 +212,7 @@ fn errors(
     report: &mut CurveReport,
 ) -> Result<Vec<Figures>> {
     let largest = settings.sizes.iter().copied().max_by(|a, b| area(*a).total_cmp(&area(*b)));
-    let largest = largest.ok_or_else(|| Error::input("the curve", "has no sizes", "give one or more"))?;
+    let Some(largest) = largest else { return Ok(Vec::new()) };
     let scale = (f64::from(ERROR_PIXELS) / f64::from(largest[0].max(largest[1]))).min(1.0);
     let views = views(scene, largest.map(|n| ((f64::from(n) * scale) as u32).max(1)))?;
     report.error_rays = views.iter().map(View::pixels).sum();
