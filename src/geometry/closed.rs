@@ -12,7 +12,7 @@ use glam::DVec3;
 
 use super::boxtree::BoxTree;
 use super::fault::{MeshFault, Notice};
-use super::inside::{Side, crossings_ahead, side_of_surface};
+use super::inside::{Side, crossings_ahead, side_of_surface, winding_around};
 use super::rounding::rounding_tolerance_mm;
 use super::topology::{Components, Edges};
 use super::{Bounds, TriMesh};
@@ -144,6 +144,11 @@ impl ClosedMesh {
     /// On which side of the surface `point` lies. Exact.
     pub fn side_of(&self, point: DVec3) -> Side {
         side_of_surface(&self.mesh, &self.tree, point)
+    }
+
+    /// How often the surface winds around a point: once inside a solid. `None` on the surface. Exact.
+    pub(super) fn winding_around(&self, point: DVec3) -> Option<i32> {
+        winding_around(&self.mesh, &self.tree, point)
     }
 
     /// The greatest height `normal · (vertex − from)` of a vertex above `at_least`, and that vertex. `None` if there is

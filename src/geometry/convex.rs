@@ -1,10 +1,13 @@
 //! Convex bodies: closed surfaces all of whose vertices lie behind all of their face planes.
 
+use std::cmp::Ordering;
 use std::collections::HashMap;
 
 use glam::DVec3;
 
 use super::numeric::unit_normal;
+use super::predicates::side_of_plane;
+use super::rounding::arithmetic_mm;
 use super::{Bounds, ClosedMesh};
 
 /// A face plane in vertex form: the half-space `normal · (p − point) ≤ 0`.
@@ -67,7 +70,9 @@ impl std::fmt::Display for NotConvex {
 impl ConvexMesh {
     /// Proves that `surface` is convex within the rounding of its vertices, or hands it back with the reason.
     ///
-    /// Every vertex is held against every face's plane (a branch-and-bound search, about n log n).
+    /// A surface that is convex at each of its edges by exact signs, and that a point within sees once in each direction, is
+    /// convex as a whole (see `is_strictly_convex`). Where that does not tell, as in flat faces of many triangles, every
+    /// vertex is held against every face's plane: a branch-and-bound search.
     pub fn new(surface: ClosedMesh) -> Result<Self, Box<(ClosedMesh, NotConvex)>> {
         if surface.component_count() > 1 {
             let count = surface.component_count();
@@ -79,6 +84,11 @@ impl ConvexMesh {
         }
         // A face without area bounds nothing: its plane is left out, and its neighbours close the body.
         let (planes, plane_of_face) = distinct_planes(&surface);
+        if planes.len() == plane_of_face.len() && is_strictly_convex(&surface) {
+            // No vertex stands out of an exact plane, so only the rounding of normals and heights is left.
+            let reflex_depth_mm = arithmetic_mm(surface.bounds());
+            return Ok(Self { surface, planes, plane_of_face, reflex_depth_mm });
+        }
         let tolerance_mm = surface.rounding_tolerance_mm();
         let (depth_mm, place) = planes.iter().fold((0.0, DVec3::ZERO), |worst, plane| {
             surface.farthest_vertex(plane.normal, plane.point, worst.0).unwrap_or(worst)
@@ -137,6 +147,27 @@ fn distinct_planes(surface: &ClosedMesh) -> (Vec<Plane>, Vec<Option<u32>>) {
         })
         .collect();
     (planes, of_face)
+}
+
+/// Whether a surface of one component is strictly convex, by exact signs: `false` where in doubt.
+///
+/// It is if it is convex at every edge, if a point lies below all faces, and if each direction from there meets one face
+/// only (Mehlhorn et al. 1999, doi:10.1016/S0925-7721(98)00036-4). As the point sees all faces from behind, every direction
+/// meets as many as one direction does: without that a surface could wind around the point twice.
+fn is_strictly_convex(surface: &ClosedMesh) -> bool {
+    let mesh = surface.mesh();
+    let middle = mesh.vertices.iter().sum::<DVec3>() / mesh.vertices.len() as f64;
+    let is_below = |face: usize, p: DVec3| side_of_plane(mesh.triangle(face), p) == Ordering::Less;
+    let is_convex_at = |face: usize| {
+        let corners = mesh.faces[face];
+        surface.neighbours(face).into_iter().all(|other| {
+            // Each edge is asked about once.
+            let apex = mesh.faces[other as usize].into_iter().find(|v| !corners.contains(v));
+            (other as usize) < face || apex.is_some_and(|v| is_below(face, mesh.vertices[v as usize]))
+        })
+    };
+    (0..mesh.faces.len()).all(|face| is_convex_at(face) && is_below(face, middle))
+        && surface.winding_around(middle) == Some(1)
 }
 
 #[cfg(test)]

@@ -30,7 +30,7 @@ pub fn side_of_surface(mesh: &TriMesh, tree: &BoxTree, point: DVec3) -> Side {
 
 /// How often the surface winds around `point`: 1 inside an outward-looking surface, −1 inside an inward-looking one, 0
 /// outside. `None` on the surface.
-fn winding_around(mesh: &TriMesh, tree: &BoxTree, point: DVec3) -> Option<i32> {
+pub fn winding_around(mesh: &TriMesh, tree: &BoxTree, point: DVec3) -> Option<i32> {
     let (mut turns, mut on_surface) = (0, false);
     crossings_ahead(mesh, tree, point, |_, crossing| match crossing {
         Some(winding) => turns += winding,

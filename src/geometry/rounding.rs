@@ -12,10 +12,15 @@ use super::numeric::gamma;
 /// differences, a dot product, a unit normal of three roundings). The grid is taken from the coordinates where none is
 /// given.
 pub(super) fn rounding_tolerance_mm(vertices: &[DVec3], grid_mm: Option<f64>) -> f64 {
-    let arithmetic = gamma(10) * Bounds::of(vertices.iter().copied()).diagonal();
+    let arithmetic = arithmetic_mm(Bounds::of(vertices.iter().copied()));
     let grid = grid_mm.unwrap_or_else(|| written_grid(vertices));
     let half_diagonal = 0.5 * 3f64.sqrt() * grid;
     arithmetic + 2.0 * half_diagonal
+}
+
+/// How far out of a face's plane arithmetic in f64 may put a vertex that is not, mm: γ₁₀ of the extent.
+pub(super) fn arithmetic_mm(bounds: Bounds) -> f64 {
+    gamma(10) * bounds.diagonal()
 }
 
 /// The coarsest grid all coordinates lie on, in their own unit: a decimal one of six to nine places, else the spacing of
