@@ -28,7 +28,7 @@ pub mod walk;
 
 pub use body::Body;
 pub use engine::{BodyView, Engine};
-pub use record::{Lengths, Pierce, Pierced, Record, Spans, Way};
+pub use record::{Lengths, Passes, Pierce, Pierced, Record, Spans, Way};
 
 #[cfg(test)]
 mod tests;

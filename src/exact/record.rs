@@ -26,6 +26,9 @@ pub trait Record {
     /// Whether the faces gone through are asked for. If not, an engine that would have to look for them reports any.
     const ASKS_FACES: bool;
 
+    /// Whether places of crossings are asked for, and not only lengths.
+    const ASKS_ENDS: bool = true;
+
     /// Ray `ray` goes through `face`, `t_mm` from its source.
     fn crossing(&mut self, ray: usize, t_mm: f64, face: u32, way: Way);
 
@@ -35,17 +38,37 @@ pub trait Record {
             self.crossing(first + i, t, face, way);
         }
     }
+
+    /// The rays from `first` on pass so, through faces that are not told.
+    fn passes(&mut self, first: usize, passes: &Passes) {
+        let [entries, exits] = passes.ends_mm;
+        for (i, (&entry, &exit)) in entries.iter().zip(exits).enumerate().filter(|(_, (a, b))| a < b) {
+            self.crossing(first + i, entry, 0, Way::In);
+            self.crossing(first + i, exit, 0, Way::Out);
+        }
+    }
+}
+
+/// Rays that go through a body once at most, one after the other.
+#[derive(Clone, Copy, Debug)]
+pub struct Passes<'a> {
+    /// The length within the body, mm. None for those that miss.
+    pub lengths_mm: &'a [f64],
+    /// Where they enter, mm from the source, and where they leave: not the entry before the exit for those that miss. Empty
+    /// unless [asked for](Record::ASKS_ENDS).
+    pub ends_mm: [&'a [f64]; 2],
 }
 
 /// Adds each ray's length within the body to its entry, mm.
 ///
-/// The sum is Σ t over exits less Σ t over entries, so its error grows with the distance from the source: γₙ · Σ|t| for n
-/// crossings.
+/// Of single crossings the sum is Σ t over exits less Σ t over entries, so its error grows with the distance from the
+/// source: γₙ · Σ|t| for n crossings.
 #[derive(Debug)]
 pub struct Lengths<'a>(pub &'a mut [f64]);
 
 impl Record for Lengths<'_> {
     const ASKS_FACES: bool = false;
+    const ASKS_ENDS: bool = false;
 
     #[inline]
     fn crossing(&mut self, ray: usize, t_mm: f64, _face: u32, way: Way) {
@@ -61,6 +84,12 @@ impl Record for Lengths<'_> {
             Way::Out => lengths.for_each(|(length, t)| *length += t),
             Way::In => lengths.for_each(|(length, t)| *length -= t),
         }
+    }
+
+    #[inline]
+    fn passes(&mut self, first: usize, passes: &Passes) {
+        let lengths = self.0[first..first + passes.lengths_mm.len()].iter_mut();
+        lengths.zip(passes.lengths_mm).for_each(|(length, of_pass)| *length += of_pass);
     }
 }
 
@@ -83,6 +112,7 @@ impl Record for Spans {
 /// Both of two records.
 impl<A: Record, B: Record> Record for (A, B) {
     const ASKS_FACES: bool = A::ASKS_FACES || B::ASKS_FACES;
+    const ASKS_ENDS: bool = A::ASKS_ENDS || B::ASKS_ENDS;
 
     #[inline]
     fn crossing(&mut self, ray: usize, t_mm: f64, face: u32, way: Way) {
@@ -95,10 +125,17 @@ impl<A: Record, B: Record> Record for (A, B) {
         self.0.run(first, t_mm, face, way);
         self.1.run(first, t_mm, face, way);
     }
+
+    #[inline]
+    fn passes(&mut self, first: usize, passes: &Passes) {
+        self.0.passes(first, passes);
+        self.1.passes(first, passes);
+    }
 }
 
 impl<R: Record> Record for &mut R {
     const ASKS_FACES: bool = R::ASKS_FACES;
+    const ASKS_ENDS: bool = R::ASKS_ENDS;
 
     #[inline]
     fn crossing(&mut self, ray: usize, t_mm: f64, face: u32, way: Way) {
@@ -108,6 +145,11 @@ impl<R: Record> Record for &mut R {
     #[inline]
     fn run(&mut self, first: usize, t_mm: &[f64], face: u32, way: Way) {
         (**self).run(first, t_mm, face, way);
+    }
+
+    #[inline]
+    fn passes(&mut self, first: usize, passes: &Passes) {
+        (**self).passes(first, passes);
     }
 }
 

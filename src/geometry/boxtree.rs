@@ -190,8 +190,7 @@ fn partition(boxes: &[Bounds], items: &mut [u32], by_cost: bool) -> usize {
     // A split that leaves nearly all on one side would make the tree as deep as it has items.
     let smallest_side = items.len() / 16;
     if let Some((_, axis, cut)) = best {
-        items.sort_by_key(|&i| (bin_of(axis, centre(i)), i));
-        let middle = items.partition_point(|&i| bin_of(axis, centre(i)) < cut);
+        let middle = stable_partition(items, |i| bin_of(axis, centre(i)) < cut);
         if middle.min(items.len() - middle) >= smallest_side.max(1) {
             return middle;
         }
@@ -199,6 +198,23 @@ fn partition(boxes: &[Bounds], items: &mut [u32], by_cost: bool) -> usize {
     let longest = if extent.x >= extent.y.max(extent.z) { 0 } else { 1 + usize::from(extent.z > extent.y) };
     items.sort_by(|&i, &j| centre(i)[longest].total_cmp(&centre(j)[longest]).then(i.cmp(&j)));
     items.len() / 2
+}
+
+/// Moves the items of which `is_first` holds before the others, keeping the order of both; returns how many they are.
+fn stable_partition(items: &mut [u32], is_first: impl Fn(u32) -> bool) -> usize {
+    let mut others = Vec::new();
+    let mut count = 0;
+    for at in 0..items.len() {
+        let item = items[at];
+        if is_first(item) {
+            items[count] = item;
+            count += 1;
+        } else {
+            others.push(item);
+        }
+    }
+    items[count..].copy_from_slice(&others);
+    count
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Faces sorted by where they are seen, for any region to find its own.
 //!
 //! ```text
-//!   level 0: 16 pixels       level 1: 32 pixels      … each face once: in the finest level whose cells are no smaller
+//!   level 0: 8 pixels        level 1: 16 pixels      … each face once: in the finest level whose cells are no smaller
 //!   ┌──┬──┬──┬──┐            ┌─────┬─────┐             than its box, in the cell of the box's first corner.
 //!   │  │▟▙│  │  │            │    ▟███▙  │             So a region meets the faces of its own cells and
 //!   ├──┼──┼──┼──┤            │   ▟█████▙ │             of those one up and one left of them.
@@ -21,14 +21,17 @@ pub struct Pixels {
 }
 
 impl Pixels {
-    /// From the least to before the greatest of some columns and rows.
-    pub fn between(places: impl Iterator<Item = [i32; 2]>) -> Self {
-        let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
-        for [x, y] in places {
-            low = [low[0].min(x), low[1].min(y)];
-            high = [high[0].max(x), high[1].max(y)];
-        }
-        Self { columns: low[0]..high[0], rows: low[1]..high[1] }
+    /// No pixels, to be joined with others.
+    pub const NONE: Self = Self { columns: i32::MAX..i32::MIN, rows: i32::MAX..i32::MIN };
+
+    pub fn is_empty(&self) -> bool {
+        self.columns.is_empty() || self.rows.is_empty()
+    }
+
+    /// The least rectangle that holds both; neither may be empty, unless as [`Self::NONE`] is.
+    pub fn union(&self, other: &Self) -> Self {
+        let both = |a: &Range<i32>, b: &Range<i32>| a.start.min(b.start)..a.end.max(b.end);
+        Self { columns: both(&self.columns, &other.columns), rows: both(&self.rows, &other.rows) }
     }
 
     /// Wider by so many pixels on every side.
@@ -54,6 +57,8 @@ pub struct CellFace {
 /// Faces, each in the cell of its box.
 #[derive(Clone, Debug)]
 pub struct Cells {
+    /// The pixels that a face may cover: cells are counted from their first corner.
+    bounds: Pixels,
     levels: Vec<Level>,
     /// Where the faces of a cell begin in `faces`; one entry more than there are cells.
     starts: Vec<u32>,
@@ -65,79 +70,106 @@ struct Level {
     first_cell: usize,
     across: i32,
     down: i32,
-    /// How many levels finer, and this one, have a face.
+    /// Whether a face is in it.
     is_used: bool,
+}
+
+impl Level {
+    /// All levels for some pixels, from the finest to one of a single cell; and how many cells they have.
+    fn all(bounds: &Pixels) -> (Vec<Self>, usize) {
+        let (columns, rows) = (bounds.columns.len() as i32, bounds.rows.len() as i32);
+        let (mut levels, mut cells) = (Vec::new(), 0);
+        loop {
+            let side = FINEST << levels.len();
+            let (across, down) = ((columns - 1) / side + 1, (rows - 1) / side + 1);
+            levels.push(Self { first_cell: cells, across, down, is_used: false });
+            cells += across as usize * down as usize;
+            if across <= 1 && down <= 1 {
+                return (levels, cells);
+            }
+        }
+    }
 }
 
 /// Collects faces for their cells.
 pub struct CellSorter {
-    levels: Vec<Level>,
-    counts: Vec<u32>,
-    /// Faces and their cells.
-    pending: Vec<(CellFace, u32)>,
-    bounds: Pixels,
+    /// Faces, where their boxes of pixels start, and how large these are.
+    pending: Vec<(CellFace, [i32; 2], i32)>,
+    low: [i32; 2],
+    high: [i32; 2],
 }
 
 impl CellSorter {
-    /// For some `faces` seen in `bounds`.
-    pub fn new(bounds: Pixels, faces: usize) -> Self {
-        let (columns, rows) = (bounds.columns.len() as i32, bounds.rows.len() as i32);
-        let mut levels = Vec::new();
-        let mut cells = 0;
-        loop {
-            let side = FINEST << levels.len();
-            let (across, down) = ((columns - 1) / side + 1, (rows - 1) / side + 1);
-            levels.push(Level { first_cell: cells, across, down, is_used: false });
-            cells += across as usize * down as usize;
-            if across == 1 && down == 1 {
-                break;
-            }
-        }
-        // Counted one cell on, so that the sums become the starts.
-        Self { levels, counts: vec![0; cells + 1], pending: Vec::with_capacity(faces), bounds }
+    /// For at most so many faces.
+    pub fn new(faces: usize) -> Self {
+        Self { pending: Vec::with_capacity(faces), low: [i32::MAX; 2], high: [i32::MIN; 2] }
     }
 
-    /// Adds a face whose box of pixels, within the bounds, starts here and is so large.
+    /// Adds a face whose box of pixels, not empty, goes from here to before there.
     #[inline(always)]
-    pub fn add(&mut self, face: CellFace, [column, row]: [i32; 2], size: i32) {
-        // The number of bits beyond those of the finest cell.
-        let level = (32 - ((size - 1) >> FINEST_LOG2).leading_zeros()) as usize;
-        let level = level.min(self.levels.len() - 1);
-        let shift = FINEST_LOG2 + level as u32;
-        let (column, row) = (column - self.bounds.columns.start, row - self.bounds.rows.start);
-        let Level { first_cell, across, .. } = self.levels[level];
-        let cell = first_cell + ((row >> shift) * across + (column >> shift)) as usize;
-        self.counts[cell + 1] += 1;
-        self.pending.push((face, cell as u32));
+    pub fn add(&mut self, face: CellFace, start: [i32; 2], end: [i32; 2]) {
+        let size = (end[0] - start[0]).max(end[1] - start[1]);
+        self.pending.push((face, start, size));
+        self.low = [self.low[0].min(start[0]), self.low[1].min(start[1])];
+        self.high = [self.high[0].max(end[0]), self.high[1].max(end[1])];
     }
 
     /// Sorts them by cell, and in the order they were added within a cell.
     pub fn sort(self) -> Cells {
-        let Self { mut levels, counts: mut starts, pending, .. } = self;
+        let Self { pending, low, high } = self;
+        if pending.is_empty() {
+            let bounds = Pixels { columns: 0..0, rows: 0..0 };
+            return Cells { bounds, levels: Vec::new(), starts: Vec::new(), faces: Vec::new() };
+        }
+        let bounds = Pixels { columns: low[0]..high[0], rows: low[1]..high[1] };
+        let (mut levels, cells) = Level::all(&bounds);
+        let coarsest = levels.len() - 1;
+        let cell_of = |&(_, [column, row], size): &(CellFace, [i32; 2], i32)| {
+            // The number of bits beyond those of the finest cell.
+            let level = ((32 - ((size - 1) >> FINEST_LOG2).leading_zeros()) as usize).min(coarsest);
+            let shift = FINEST_LOG2 + level as u32;
+            let Level { first_cell, across, .. } = levels[level];
+            first_cell + (((row - low[1]) >> shift) * across + ((column - low[0]) >> shift)) as usize
+        };
+        // Counted one cell on, so that the sums become the starts.
+        let mut starts = vec![0; cells + 1];
+        pending.iter().for_each(|face| starts[cell_of(face) + 1] += 1);
         for i in 1..starts.len() {
             starts[i] += starts[i - 1];
+        }
+        let mut next = starts.clone();
+        let mut faces = vec![CellFace::default(); pending.len()];
+        for face in &pending {
+            let slot = &mut next[cell_of(face)];
+            faces[*slot as usize] = face.0;
+            *slot += 1;
         }
         for level in &mut levels {
             let last = level.first_cell + level.across as usize * level.down as usize;
             level.is_used = starts[last] > starts[level.first_cell];
         }
-        let mut next = starts.clone();
-        let mut faces = vec![CellFace::default(); pending.len()];
-        for (face, cell) in pending {
-            let slot = &mut next[cell as usize];
-            faces[*slot as usize] = face;
-            *slot += 1;
-        }
-        Cells { levels, starts, faces }
+        Cells { bounds, levels, starts, faces }
     }
 }
 
 impl Cells {
-    /// The faces that may be seen in a region, given from the first corner of the bounds, as runs of their list. The order
-    /// of any two faces is the same for all regions.
+    /// The pixels that the faces' boxes hold.
+    pub fn bounds(&self) -> &Pixels {
+        &self.bounds
+    }
+
+    /// The faces that may be seen in a region, as runs of their list. The order of any two faces is the same for all
+    /// regions.
     pub fn near(&self, region: &Pixels) -> impl Iterator<Item = &[CellFace]> {
-        let region = region.clone();
-        let used = self.levels.iter().enumerate().filter(|(_, level)| level.is_used);
+        let common = self.bounds.intersection(region);
+        let within = |range: &Range<i32>, start: i32| range.start - start..range.end - start;
+        let region = Pixels {
+            columns: within(&common.columns, self.bounds.columns.start),
+            rows: within(&common.rows, self.bounds.rows.start),
+        };
+        // A region without pixels meets no faces.
+        let levels = if region.is_empty() { &[] } else { &self.levels[..] };
+        let used = levels.iter().enumerate().filter(|(_, level)| level.is_used);
         used.flat_map(move |(i, level)| {
             let side = FINEST << i;
             let cells = |range: &Range<i32>, count: i32| {
@@ -146,10 +178,8 @@ impl Cells {
             let columns = cells(&region.columns, level.across);
             cells(&region.rows, level.down).map(move |row| {
                 let cell = |column: i32| level.first_cell + (row * level.across + column) as usize;
-                let start = self.starts[cell(columns.start)] as usize;
-                // A region beyond the last column meets no cells.
-                let end = self.starts[cell(columns.end.max(columns.start))] as usize;
-                &self.faces[start..end]
+                &self.faces
+                    [self.starts[cell(columns.start)] as usize..self.starts[cell(columns.end)] as usize]
             })
         })
     }

@@ -13,6 +13,7 @@
 //! So an edge crosses those rows r with y₀ ≤ r < y₁, and the centres left of it are those below the ceiling of its
 //! crossing. That ceiling is exact, hence the same for both faces of an edge, whichever way they go along it.
 
+use pulp::Simd;
 use robust::{Coord, orient2d};
 
 use super::edge_on::THICKNESS;
@@ -161,6 +162,18 @@ impl Slope {
     pub fn depth(&self, of_row: f64, column: f64) -> f64 {
         let depth = of_row + self.per_column * (column - self.base.x);
         greater(lesser(depth, self.highest), self.lowest)
+    }
+}
+
+impl Slope {
+    /// As [`depth`](Self::depth), at many columns.
+    #[inline(always)]
+    pub fn depths<S: Simd>(&self, simd: S, of_row: f64, columns: S::f64s) -> S::f64s {
+        let offsets = simd.sub_f64s(columns, simd.splat_f64s(self.base.x));
+        let rise = simd.mul_f64s(simd.splat_f64s(self.per_column), offsets);
+        let depths = simd.add_f64s(simd.splat_f64s(of_row), rise);
+        // As `lesser` and `greater` choose: a depth that is not a number is the face's own.
+        simd.max_f64s(simd.min_f64s(depths, simd.splat_f64s(self.highest)), simd.splat_f64s(self.lowest))
     }
 }
 

@@ -16,6 +16,7 @@
 //! predicates are: by a float where that can tell, by an exact sign where it cannot.
 
 mod cells;
+mod chords;
 mod edge_on;
 mod face;
 mod near;
@@ -51,6 +52,7 @@ pub struct RasterView<'a> {
     surface: &'a ClosedMesh,
     grid: RayGrid,
     form: Form,
+    is_convex: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -69,7 +71,8 @@ struct Seen {
     places: Vec<Place>,
     /// The pixels that a face may cover.
     bounds: Pixels,
-    cells: Cells,
+    /// Of each job's faces, in their order.
+    cells: Vec<Cells>,
     /// The pixels on edge-on faces, in order. `None` if they are to be found in passing.
     edge_on: Option<Vec<EdgeOn>>,
     source_is_inside: bool,
@@ -85,6 +88,12 @@ const NEAR: f64 = 0.25;
 /// Fewer are projected sooner than another thread would have begun.
 const VERTICES_PER_JOB: usize = 4096;
 
+/// Faces sorted by one thread at a time: those of a job are looked up together, and their list stays in the cache.
+const FACES_PER_JOB: usize = 4096;
+
+/// Blocks look into the cells of each job, so there are no more.
+const MOST_JOBS: usize = 32;
+
 /// Places that err by more than this, in pixels, are not used. They usually err by 1e-11.
 const LARGEST_PLACE_ERROR: f64 = 1e-4;
 
@@ -92,7 +101,12 @@ impl<'a> RasterView<'a> {
     /// Projects `surface` onto `grid` and sorts its faces by where they are seen.
     pub fn new(surface: &'a ClosedMesh, grid: &RayGrid) -> Self {
         let form = Form::new(surface, grid);
-        Self { surface, grid: *grid, form }
+        Self { surface, grid: *grid, form, is_convex: false }
+    }
+
+    /// As [`new`](Self::new), for a surface that is convex but for rounding: its rays go in and out once, which is quicker.
+    pub fn of_convex(surface: &'a ClosedMesh, grid: &RayGrid) -> Self {
+        Self { is_convex: true, ..Self::new(surface, grid) }
     }
 
     /// Reports every crossing of every ray of `region`; rays are numbered in its order. Crossings are mm from the ray's source,
@@ -205,51 +219,41 @@ impl Seen {
             return None;
         }
         let Shape { corners, numbers, places } = shape;
-        let ceilings: Vec<[i32; 2]> = places.iter().map(|p| [round::ceil(p.x), round::ceil(p.y)]).collect();
+        let ceiling = |p: &Place| [round::ceil(p.x), round::ceil(p.y)];
+        let ceilings: Vec<[i32; 2]> = places.par_iter().with_min_len(VERTICES_PER_JOB).map(ceiling).collect();
         let on_a_line = |x: f64| round::nearest(x).1.abs() <= 2.0 * edge_on::NEAR * errors.place;
         // A face that lies on a pixel has it in its box, unless a corner lies on a line of pixels; then all faces are looked
         // at, and not only those that may cover pixels when they are traced.
-        let look_closely = places.iter().any(|p| on_a_line(p.x) || on_a_line(p.y));
-        let bounds = if source_is_inside {
-            window.clone()
-        } else {
-            let around = match numbers {
-                // Every vertex of a closed surface has a face.
-                None => Pixels::between(ceilings.iter().copied()),
-                Some(_) => Pixels::between(corners.iter().flatten().map(|&v| ceilings[v as usize])),
+        let is_on_a_line = |p: &Place| on_a_line(p.x) || on_a_line(p.y);
+        let look_closely = places.par_iter().with_min_len(VERTICES_PER_JOB).any(is_on_a_line);
+        let per_job = (corners.len() / MOST_JOBS).max(FACES_PER_JOB);
+        let sort = |(job, faces): (usize, &[[u32; 3]])| {
+            let number = |i: usize| {
+                let i = job * per_job + i;
+                numbers.as_ref().map_or(i as u32, |n| n[i])
             };
-            // A pixel on the outline may lie on an edge-on face.
-            around.grown(1).intersection(window)
-        };
-        let mut edge_on = Vec::new();
-        let mut sorter = CellSorter::new(bounds.clone(), corners.len());
-        for (i, face) in corners.iter().enumerate() {
-            let number = numbers.as_ref().map_or(i as u32, |n| n[i]);
+            let mut sorted = SortedFaces::new(faces, number, &ceilings, window);
             if look_closely {
-                let triangle = face.map(|v| places[v as usize]);
-                if is_edge_on(triangle, errors.place) {
-                    pixels_along(triangle, number, errors.place, window, &mut edge_on);
+                for (i, face) in faces.iter().enumerate() {
+                    let triangle = face.map(|v| places[v as usize]);
+                    if is_edge_on(triangle, errors.place) {
+                        pixels_along(triangle, number(i), errors.place, window, &mut sorted.edge_on);
+                    }
                 }
             }
-            let [a, b, c] = face.map(|v| ceilings[v as usize]);
-            let low = [a[0].min(b[0]).min(c[0]), a[1].min(b[1]).min(c[1])];
-            let high = [a[0].max(b[0]).max(c[0]), a[1].max(b[1]).max(c[1])];
-            let start = [low[0].max(bounds.columns.start), low[1].max(bounds.rows.start)];
-            let end = [high[0].min(bounds.columns.end), high[1].min(bounds.rows.end)];
-            if start[0] < end[0] && start[1] < end[1] {
-                sorter.add(
-                    CellFace { number, corners: *face },
-                    start,
-                    (end[0] - start[0]).max(end[1] - start[1]),
-                );
-            }
-        }
+            sorted
+        };
+        let sorted: Vec<SortedFaces> = corners.par_chunks(per_job).enumerate().map(sort).collect();
+        let around = sorted.iter().fold(Pixels::NONE, |all, part| all.union(&part.around));
+        // A pixel on the outline may lie on an edge-on face.
+        let bounds = if source_is_inside { window.clone() } else { around.grown(1).intersection(window) };
+        let mut edge_on: Vec<EdgeOn> = sorted.iter().flat_map(|part| &part.edge_on).copied().collect();
         edge_on::sort(&mut edge_on);
         Some(Self {
             projection,
             places,
             bounds,
-            cells: sorter.sort(),
+            cells: sorted.into_iter().map(|part| part.cells).collect(),
             edge_on: look_closely.then_some(edge_on),
             source_is_inside,
             // A difference, a slope of three roundings, a product and a sum: γ₅ of twice the extent, and γ₁ of it.
@@ -257,6 +261,39 @@ impl Seen {
             place_error: errors.place,
             care: Care::new(errors.place, errors.depth),
         })
+    }
+}
+
+/// Some of a surface's faces, sorted by where they are seen.
+struct SortedFaces {
+    cells: Cells,
+    /// Pixels on edge-on faces, in no order.
+    edge_on: Vec<EdgeOn>,
+    /// All columns and rows that corners are seen in, also off the window.
+    around: Pixels,
+}
+
+impl SortedFaces {
+    fn new(
+        faces: &[[u32; 3]],
+        number: impl Fn(usize) -> u32,
+        ceilings: &[[i32; 2]],
+        window: &Pixels,
+    ) -> Self {
+        let mut sorter = CellSorter::new(faces.len());
+        let mut around = Pixels::NONE;
+        for (i, face) in faces.iter().enumerate() {
+            let [a, b, c] = face.map(|v| ceilings[v as usize]);
+            let low = [a[0].min(b[0]).min(c[0]), a[1].min(b[1]).min(c[1])];
+            let high = [a[0].max(b[0]).max(c[0]), a[1].max(b[1]).max(c[1])];
+            around = around.union(&Pixels { columns: low[0]..high[0], rows: low[1]..high[1] });
+            let start = [low[0].max(window.columns.start), low[1].max(window.rows.start)];
+            let end = [high[0].min(window.columns.end), high[1].min(window.rows.end)];
+            if start[0] < end[0] && start[1] < end[1] {
+                sorter.add(CellFace { number: number(i), corners: *face }, start, end);
+            }
+        }
+        Self { cells: sorter.sort(), edge_on: Vec::new(), around }
     }
 }
 

@@ -6,25 +6,26 @@
 use std::ops::Range;
 
 use super::cells::{CellFace, Pixels};
+use super::chords::{self, Depths, measure};
 use super::edge_on::{self, EdgeOn, is_edge_on, is_listed, pixels_along};
 use super::face::{Edge, Slope, order};
 use super::{RasterView, Seen, round};
 use crate::exact::record::{Record, Way};
-use crate::geometry::{Region, Upstream};
+use crate::geometry::Region;
 
 /// A region is traced in blocks whose lists stay in the cache.
-const BLOCK_COLUMNS: i32 = 128;
+pub const BLOCK_COLUMNS: i32 = 128;
 const BLOCK_ROWS: i32 = 64;
 
 /// Crossings reported at a time.
-const RUN: usize = 64;
+pub const RUN: usize = 64;
 
 /// Traces a region.
 pub struct Tracer<'v, 'a> {
-    view: &'v RasterView<'a>,
-    seen: &'v Seen,
+    pub view: &'v RasterView<'a>,
+    pub seen: &'v Seen,
     asked: Pixels,
-    block: Block,
+    pub block: Block,
 }
 
 /// A tracer at work.
@@ -37,21 +38,23 @@ impl<R: Record> pulp::WithSimd for Widely<'_, '_, '_, R> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        self.tracer.trace_blocks(self.record);
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
+        self.tracer.trace_blocks(simd, self.record);
     }
 }
 
 /// What is known of a block. Empty between blocks.
 #[derive(Default)]
-struct Block {
+pub struct Block {
     /// Of the rays, mm.
     lengths: Vec<f64>,
     faces: Vec<Face>,
     /// The first `span_count` are in use.
     spans: Vec<Span>,
     span_count: usize,
-    edge_on: Vec<EdgeOn>,
+    /// Rays to be traced by themselves.
+    pub edge_on: Vec<EdgeOn>,
+    pub depths: Depths,
 }
 
 /// A face that may cover pixels.
@@ -85,18 +88,21 @@ impl<'v, 'a> Tracer<'v, 'a> {
     }
 
     #[inline(always)]
-    fn trace_blocks(&mut self, record: &mut impl Record) {
+    fn trace_blocks<S: pulp::Simd, R: Record>(&mut self, simd: S, record: &mut R) {
+        let has_chords = self.view.is_convex && !self.seen.source_is_inside && !R::ASKS_FACES;
         let common = self.asked.intersection(&self.seen.bounds);
-        for top in common.rows.clone().step_by(BLOCK_ROWS as usize) {
+        let block_rows = if has_chords { chords::BLOCK_ROWS } else { BLOCK_ROWS };
+        for top in common.rows.clone().step_by(block_rows as usize) {
             for left in common.columns.clone().step_by(BLOCK_COLUMNS as usize) {
                 let block = Pixels {
                     columns: left..(left + BLOCK_COLUMNS).min(common.columns.end),
-                    rows: top..(top + BLOCK_ROWS).min(common.rows.end),
+                    rows: top..(top + block_rows).min(common.rows.end),
                 };
-                if self.seen.projection.is_cone() {
-                    self.trace_block::<true>(&block, record);
-                } else {
-                    self.trace_block::<false>(&block, record);
+                match (has_chords, self.seen.projection.is_cone()) {
+                    (true, true) => self.trace_block_of_chords::<true, S, R>(simd, &block, record),
+                    (true, false) => self.trace_block_of_chords::<false, S, R>(simd, &block, record),
+                    (false, true) => self.trace_block::<true>(&block, record),
+                    (false, false) => self.trace_block::<false>(&block, record),
                 }
             }
         }
@@ -106,17 +112,13 @@ impl<'v, 'a> Tracer<'v, 'a> {
     fn trace_block<const CONE: bool>(&mut self, block: &Pixels, record: &mut impl Record) {
         self.block.faces.clear();
         self.block.span_count = 0;
-        self.block.edge_on.clear();
-        self.block.edge_on.extend(
-            edge_on::in_rows(self.seen.edge_on.as_deref().unwrap_or_default(), &block.rows)
-                .iter()
-                .filter(|e| block.columns.contains(&e.column)),
-        );
+        self.list_edge_on(block);
         self.cover::<CONE>(block);
         if self.block.span_count > 0 {
             self.measure_rays(block);
         }
         if !self.block.edge_on.is_empty() {
+            edge_on::sort(&mut self.block.edge_on);
             self.trace_edge_on(record);
         }
         if self.seen.source_is_inside {
@@ -132,19 +134,25 @@ impl<'v, 'a> Tracer<'v, 'a> {
         }
     }
 
+    /// Begins the list of rays to be traced by themselves with those known to lie in faces.
+    #[inline(always)]
+    pub fn list_edge_on(&mut self, block: &Pixels) {
+        let known = self.seen.edge_on.as_deref().unwrap_or_default();
+        let in_block =
+            edge_on::in_rows(known, &block.rows).iter().filter(|e| block.columns.contains(&e.column));
+        self.block.edge_on.clear();
+        self.block.edge_on.extend(in_block);
+    }
+
     /// Lists the faces and what they cover.
     #[inline(always)]
     fn cover<const CONE: bool>(&mut self, block: &Pixels) {
         let seen = self.seen;
-        let first = &seen.bounds;
-        let within = |range: &Range<i32>, start: i32| range.start - start..range.end - start;
-        let region = Pixels {
-            columns: within(&block.columns, first.columns.start),
-            rows: within(&block.rows, first.rows.start),
-        };
-        for faces in seen.cells.near(&region) {
-            for face in faces {
-                self.cover_by::<CONE>(face, block);
+        for cells in &seen.cells {
+            for faces in cells.near(block) {
+                for face in faces {
+                    self.cover_by::<CONE>(face, block);
+                }
             }
         }
     }
@@ -192,54 +200,38 @@ impl<'v, 'a> Tracer<'v, 'a> {
         block_spans.span_count = count;
         // Of the whole way, from the source to the pixel: shares from 0 to 1.
         let limits = if CONE { [1.0, f64::INFINITY] } else { [0.0, 1.0] };
-        let (slope, is_sure) = Slope::new([a, b, c], seen.care, limits);
-        self.block.faces.push(Face { slope, number: face.number });
+        let (mut slope, is_sure) = Slope::new([a, b, c], seen.care, limits);
         if !is_sure {
-            self.look_closely(face, limits, block);
+            slope = self.look_closely(face, limits, block);
         }
+        self.block.faces.push(Face { slope, number: face.number });
     }
 
-    /// Corrects the slope of the last face, which needs care, and lists the pixels on it if it is edge-on.
+    /// The slope of a face that needs care; lists the pixels on it if it is edge-on.
     #[cold]
     #[inline(never)]
-    fn look_closely(&mut self, face: &CellFace, limits: [f64; 2], block: &Pixels) {
+    pub fn look_closely(&mut self, face: &CellFace, limits: [f64; 2], block: &Pixels) -> Slope {
         let seen = self.seen;
         let places = face.corners.map(|v| seen.places[v as usize]);
         if seen.edge_on.is_none() && is_edge_on(places, seen.place_error) {
             pixels_along(places, face.number, seen.place_error, block, &mut self.block.edge_on);
         }
-        if let Some(last) = self.block.faces.last_mut() {
-            last.slope = Slope::careful(places, limits);
-        }
+        Slope::careful(places, limits)
     }
 
-    /// The lengths of the block's rays: to the last bit those of their segments.
+    /// The lengths of the block's rays.
     #[inline(always)]
     fn measure_rays(&mut self, block: &Pixels) {
-        let lengths = &mut self.block.lengths;
-        let columns = block.columns.len();
-        let grid = &self.view.grid;
-        match grid.upstream() {
-            Upstream::Path(path) => {
-                lengths.clear();
-                lengths.resize(columns * block.rows.len(), path.length());
-            }
-            Upstream::Source(source) => {
-                lengths.resize(columns * block.rows.len(), 0.0);
-                for (row, lengths) in block.rows.clone().zip(lengths.chunks_exact_mut(columns)) {
-                    for (i, length) in lengths.iter_mut().enumerate() {
-                        let column = block.columns.start + i as i32;
-                        *length = (grid.point(column as u32, row as u32) - source).length();
-                    }
-                }
-            }
+        let (lengths, columns) = (&mut self.block.lengths, block.columns.len());
+        lengths.resize(columns * block.rows.len(), 0.0);
+        for (row, lengths) in block.rows.clone().zip(lengths.chunks_exact_mut(columns)) {
+            measure(&self.view.grid, row, block.columns.start, lengths);
         }
     }
 
-    /// Traces the rays that may lie in a face.
+    /// Traces the rays that are to be traced by themselves.
     #[cold]
-    fn trace_edge_on(&mut self, record: &mut impl Record) {
-        edge_on::sort(&mut self.block.edge_on);
+    pub fn trace_edge_on(&self, record: &mut impl Record) {
         for e in &self.block.edge_on {
             let pixel = [e.column as u32, e.row as u32];
             self.view.trace_ray(self.ray(e.row, e.column), pixel, e.face, record);
@@ -258,7 +250,7 @@ impl<'v, 'a> Tracer<'v, 'a> {
 
     /// The ray's number in the region asked for.
     #[inline(always)]
-    fn ray(&self, row: i32, column: i32) -> usize {
+    pub fn ray(&self, row: i32, column: i32) -> usize {
         (row - self.asked.rows.start) as usize * self.asked.columns.len()
             + (column - self.asked.columns.start) as usize
     }
@@ -322,7 +314,7 @@ impl<'v, 'a> Tracer<'v, 'a> {
 
 /// Three numbers from the least to the greatest.
 #[inline(always)]
-fn sorted([a, b, c]: [i32; 3]) -> [i32; 3] {
+pub fn sorted([a, b, c]: [i32; 3]) -> [i32; 3] {
     let (low, high) = (a.min(b), a.max(b));
     [low.min(c), low.max(high.min(c)), high.max(c)]
 }

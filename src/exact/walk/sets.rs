@@ -2,9 +2,10 @@
 
 use std::hint::black_box;
 
+use super::held::Follower;
 use super::{Pass, Seeds, Unsure, Walker};
 use crate::exact::{Record, Way};
-use crate::geometry::{Interval, RayGrid, Region, Segment};
+use crate::geometry::{Interval, RayGrid, Region, Segment, Upstream};
 
 /// Rays of a batch looked up together, so that their ways to memory overlap.
 const TOGETHER: usize = 32;
@@ -26,10 +27,22 @@ impl Walker {
         for row in region.rows.clone() {
             // Each row begins where the one above began.
             let (mut seeds, mut missed) = (of_row, true);
+            let mut followers = [Follower::default(); 2];
             for column in region.columns.clone() {
                 let target = grid.point(column, row);
                 let origin = grid.start_of(target);
                 let dir = target - origin;
+                if let Upstream::Source(_) = grid.upstream()
+                    && let [Some(entry), Some(exit)] = followers.each_mut().map(|f| f.crossing(dir))
+                    && let Some(chord) = Interval::new(entry.0, exit.0)
+                {
+                    let pass = Pass { chord, entry_face: entry.1, exit_face: exit.1 };
+                    note(record, ray, &pass, UNIT, dir.length());
+                    missed = false;
+                    ray += 1;
+                    continue;
+                }
+                let before = seeds;
                 // Where one ray misses, the next may pass by far enough to say so at once.
                 let answer = if missed && self.seeds.passes_by(origin, dir) {
                     Ok(None)
@@ -40,6 +53,13 @@ impl Walker {
                     answer
                 };
                 missed = answer == Ok(None);
+                if let (Some(from), Ok(Some(pass)), Upstream::Source(source)) =
+                    (before, answer, grid.upstream())
+                {
+                    let [entry, exit] = &mut followers;
+                    entry.walked(self, source, [from.entry, pass.entry_face], -1.0);
+                    exit.walked(self, source, [from.exit, pass.exit_face], 1.0);
+                }
                 match answer {
                     // The direction reaches from the source to the target: the segment is 0 to 1.
                     Ok(Some(pass)) => note(record, ray, &pass, UNIT, dir.length()),
