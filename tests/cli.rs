@@ -369,6 +369,19 @@ fn interrupting_a_run_that_still_loads_its_scene_stops_it_at_once() {
 }
 
 #[test]
+fn the_engine_named_traces_every_organ_and_the_summary_says_so() {
+    let folder = folder();
+    for engine in ["clip", "walk", "raster", "bvh"] {
+        let args = ["project", "balls.toml", "--method", engine, "--json", "--write", "p"];
+        let summary = summary(&chordfield(folder.path(), &args));
+        assert_eq!(summary["method"], engine);
+        // Both balls, in one view.
+        assert_eq!((&summary["organs"], &summary["views"]), (&2.into(), &1.into()));
+        assert_eq!(summary["engines"], serde_json::json!({ engine: 2 }));
+    }
+}
+
+#[test]
 fn ritrees_report_what_they_did_and_draw_their_map() {
     let folder = folder();
     let args = [

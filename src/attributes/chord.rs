@@ -68,12 +68,9 @@ impl Attribute for ChordLength<'_> {
     type Output = Option<Chord>;
 
     fn sample(&self, point: LinePoint) -> Option<Chord> {
-        let mut parts = Vec::new();
         let line = self.space.line_of(point)?;
-        self.body.chords(&line, &mut parts);
-        // A line along a face may leave and enter again within rounding; a convex body has one chord.
-        let (first, last) = (parts.first()?, parts.last()?);
-        let (start, end) = (first.start(), last.end());
+        let chord = self.body.whole_chord(&line)?;
+        let (start, end) = (chord.start(), chord.end());
         let [k, ..] = point.pair.axes();
         let lowest = if line.dir()[k] > 0.0 { start } else { end };
         let entry = (line.at(lowest)[k] - self.space.min()[k]) / self.space.size()[k];

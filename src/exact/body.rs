@@ -104,17 +104,32 @@ impl Body {
 
     /// As [`chords`](Self::chords), by an engine of choice; by another where that does not [serve](Engine::serves).
     pub fn chords_by(&self, engine: Engine, line: &Line, parts: &mut Vec<Interval>) {
-        let chord = match (engine, &self.form) {
-            (Engine::Clip, Form::Convex(convex)) => Ok(convex.clipper.chord(line)),
-            (Engine::Walk, Form::Convex(_)) => self.walked(line),
-            _ => Err(Unsure),
-        };
-        match chord {
+        match self.convex_chord_by(engine, line) {
             Ok(chord) => {
                 parts.clear();
                 parts.extend(chord);
             }
             Err(Unsure) => self.bvh().chords(self.surface(), line, parts),
+        }
+    }
+
+    /// From the entry to the last exit of `line`, mm along `dir`: the chord of a convex body. As [`chords`](Self::chords)
+    /// finds them, but without a list. `None` if it misses.
+    pub fn whole_chord(&self, line: &Line) -> Option<Interval> {
+        self.convex_chord_by(self.engine_for_rays(), line).unwrap_or_else(|Unsure| {
+            let mut parts = Vec::new();
+            self.bvh().chords(self.surface(), line, &mut parts);
+            // A line along a face may leave and enter again within rounding.
+            Interval::new(parts.first()?.start(), parts.last()?.end())
+        })
+    }
+
+    /// The chord of a convex body by an engine for those. Another should look if it is in doubt, or there is none.
+    fn convex_chord_by(&self, engine: Engine, line: &Line) -> Result<Option<Interval>, Unsure> {
+        match (engine, &self.form) {
+            (Engine::Clip, Form::Convex(convex)) => Ok(convex.clipper.chord(line)),
+            (Engine::Walk, Form::Convex(_)) => self.walked(line),
+            _ => Err(Unsure),
         }
     }
 

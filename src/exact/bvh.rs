@@ -27,7 +27,7 @@ use pulp::{Simd, WithSimd};
 
 /// A closed surface's faces in an eight-wide hierarchy of boxes, split by the surface-area heuristic.
 ///
-/// About 60 bytes per face. The surface is not held: each query must be given the one it was built from.
+/// 68 to 77 bytes per face of ellipsoids. The surface is not held: each query must be given the one it was built from.
 #[derive(Clone, Debug)]
 pub struct Bvh {
     frame: Frame,

@@ -200,6 +200,26 @@ mod tests {
     }
 
     #[test]
+    fn wide_instructions_give_the_bits_of_the_baseline() {
+        let mesh = icosphere(3).map_vertices(|v| v * DVec3::new(100.0, 80.0, 60.0));
+        let ball = clipper(mesh.clone());
+        let source = DVec3::new(20.0, -500.0, 33.0);
+        let towards = |target: DVec3| Segment::between(source, source + 2.0 * (target - source));
+        let rays: Vec<_> = mesh
+            .triangles()
+            .flat_map(|[a, b, c]| [a, a.midpoint(b), (a + b + c) / 3.0])
+            .filter_map(towards)
+            .collect();
+        let trace = |arch: pulp::Arch| {
+            let mut lengths = vec![0.0; rays.len()];
+            let record = &mut crate::exact::Lengths(&mut lengths);
+            arch.dispatch(Trace { clipper: &ball, first: 0, segments: &rays, record });
+            lengths.into_iter().map(f64::to_bits).collect::<Vec<_>>()
+        };
+        assert_eq!(trace(pulp::Arch::new()), trace(pulp::Arch::Scalar));
+    }
+
+    #[test]
     fn rays_aimed_at_every_vertex_and_edge_of_a_ball_are_not_lost() {
         let mesh = icosphere(3).map_vertices(|v| v * DVec3::new(100.0, 80.0, 60.0));
         let ball = clipper(mesh.clone());

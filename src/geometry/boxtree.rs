@@ -104,6 +104,16 @@ impl BoxTree {
         }
     }
 
+    /// The items of the leaf that is reached from the root by always taking the child whose box has the greater key.
+    pub(crate) fn items_down_by(&self, key: impl Fn(&Bounds) -> f64) -> &[u32] {
+        let Some(mut node) = self.nodes.first().map(|_| 0) else { return &[] };
+        while let Some([left, right]) = self.children(node) {
+            let key_of = |child: u32| key(&self.nodes[child as usize].bounds);
+            node = if key_of(left) >= key_of(right) { left } else { right };
+        }
+        self.items_under(node)
+    }
+
     /// Calls `pair` for each pair of items (one of each hierarchy) in leaves whose boxes touch, until it breaks.
     pub fn overlapping_pairs<B>(
         &self,

@@ -155,20 +155,23 @@ impl ClosedMesh {
     /// none. In the unit of `normal` times mm.
     pub fn farthest_vertex(&self, normal: DVec3, from: DVec3, at_least: f64) -> Option<(f64, DVec3)> {
         let best = std::cell::Cell::new((at_least, None));
-        self.tree.visit(
-            |b| {
-                let corner = DVec3::select(normal.cmpge(DVec3::ZERO), b.max, b.min);
-                normal.dot(corner - from) > best.get().0
-            },
-            |face| {
-                for vertex in self.mesh.triangle(face as usize) {
-                    let height = normal.dot(vertex - from);
-                    if height > best.get().0 {
-                        best.set((height, Some(vertex)));
-                    }
+        let highest_in = |b: &Bounds| {
+            let corner = DVec3::select(normal.cmpge(DVec3::ZERO), b.max, b.min);
+            normal.dot(corner - from)
+        };
+        let look_at = |face: u32| {
+            for vertex in self.mesh.triangle(face as usize) {
+                let height = normal.dot(vertex - from);
+                if height > best.get().0 {
+                    best.set((height, Some(vertex)));
                 }
-            },
-        );
+            }
+        };
+        if at_least == f64::NEG_INFINITY {
+            // A vertex that is high already bounds the search: one in the boxes that reach highest.
+            self.tree.items_down_by(highest_in).iter().for_each(|&face| look_at(face));
+        }
+        self.tree.visit(|b| highest_in(b) > best.get().0, look_at);
         let (height, vertex) = best.get();
         vertex.map(|v| (height, v))
     }

@@ -193,6 +193,24 @@ mod tests {
     }
 
     #[test]
+    fn exact_signs_and_the_search_agree_on_what_is_convex() {
+        let surface = |mesh| ClosedMesh::new(mesh).expect("closed").0;
+        let ball = icosphere(3).map_vertices(|v| v * DVec3::new(100.0, 80.0, 60.0));
+        assert!(is_strictly_convex(&surface(ball.clone())));
+        // Flat faces of several triangles are for the search.
+        assert!(!is_strictly_convex(&surface(cube(2.0))));
+        // Dents of one vertex, deeper than the faces around it bulge.
+        for depth in [0.01, 0.1] {
+            let mut dented = ball.clone();
+            dented.vertices[77] *= 1.0 - depth;
+            assert!(!is_strictly_convex(&surface(dented)), "{depth}");
+        }
+        // Convex at every edge but one ring: two balls through a neck.
+        let neck = ball.map_vertices(|v| v * DVec3::new(1.0, 1.0, 0.2 + (v.z / 60.0).powi(2)));
+        assert!(!is_strictly_convex(&surface(neck)));
+    }
+
+    #[test]
     fn a_dent_of_a_millimetre_is_found_and_measured() {
         let mut dented = icosphere(4).map_vertices(|v| 100.0 * v);
         dented.vertices[777] *= 0.99;

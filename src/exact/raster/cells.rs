@@ -153,11 +153,6 @@ impl CellSorter {
 }
 
 impl Cells {
-    /// The pixels that the faces' boxes hold.
-    pub fn bounds(&self) -> &Pixels {
-        &self.bounds
-    }
-
     /// The faces that may be seen in a region, as runs of their list. The order of any two faces is the same for all
     /// regions.
     pub fn near(&self, region: &Pixels) -> impl Iterator<Item = &[CellFace]> {

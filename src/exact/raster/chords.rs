@@ -251,9 +251,12 @@ impl Tracer<'_, '_> {
                 }
                 let depths = outline.slope.depths(simd, outline.slope.row(row), columns);
                 let at = plane_of(way) + depth_at(block, row, left + group);
-                let is_twice = self.block.depths.set(simd, at, depths, simd.and_m64s(is_inside, is_in_block));
+                let old = &mut self.block.depths.planes[at..at + S::F64_LANES];
+                let old = &mut S::as_mut_simd_f64s(old).0[0];
+                let is_twice = set(simd, old, depths, simd.and_m64s(is_inside, is_in_block));
                 if is_any(simd, is_twice) {
-                    self.note_twice(simd, outline.face, row, left + group, is_twice);
+                    let first = [left + group, row];
+                    note_twice(simd, &mut self.block.edge_on, outline.face, first, is_twice);
                 }
             }
         }

@@ -63,7 +63,7 @@ pub(super) struct Follower {
 }
 
 /// Rays that a face must serve to be worth holding.
-const WORTH_HOLDING: u32 = 4;
+const WORTH_HOLDING: u32 = 8;
 
 impl Follower {
     /// Where the ray along `dir` goes through the face held, if there is one and it does; and that face.

@@ -189,8 +189,13 @@ impl<'a> Forest<'a> {
 impl<'a> Grove<'_, 'a> {
     /// The tree of an organ. `None` if its body is not put in a tree.
     pub fn tree(&self, organ: usize) -> Option<&RiTree<ChordLength<'a>>> {
-        let attribute = self.forest.attribute(organ)?;
-        let tree = self.trees[organ].get_or_init(|| RiTree::new(attribute, self.forest.settings.parameters));
+        let tree = match self.trees[organ].get() {
+            Some(tree) => tree,
+            None => {
+                let attribute = self.forest.attribute(organ)?;
+                self.trees[organ].get_or_init(|| RiTree::new(attribute, self.forest.settings.parameters))
+            }
+        };
         tree.tick_to(self.now);
         Some(tree)
     }
