@@ -22,13 +22,16 @@ pub struct Pixels {
 
 impl Pixels {
     /// No pixels, to be joined with others.
-    pub const NONE: Self = Self { columns: i32::MAX..i32::MIN, rows: i32::MAX..i32::MIN };
+    pub const NONE: Self = Self {
+        columns: Range { start: i32::MAX, end: i32::MIN },
+        rows: Range { start: i32::MAX, end: i32::MIN },
+    };
 
     pub fn is_empty(&self) -> bool {
         self.columns.is_empty() || self.rows.is_empty()
     }
 
-    /// The least rectangle that holds both; neither may be empty, unless as [`Self::NONE`] is.
+    /// The least rectangle that holds both.
     pub fn union(&self, other: &Self) -> Self {
         let both = |a: &Range<i32>, b: &Range<i32>| a.start.min(b.start)..a.end.max(b.end);
         Self { columns: both(&self.columns, &other.columns), rows: both(&self.rows, &other.rows) }

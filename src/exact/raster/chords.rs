@@ -19,15 +19,16 @@ use super::edge_on::{self, EdgeOn};
 use super::face::{Edge, Slope, greater, order};
 use super::projection::Place;
 use super::round;
-use super::tracer::{BLOCK_COLUMNS, RUN, Tracer, sorted};
+use super::tracer::{BLOCK_COLUMNS, BLOCK_ROWS, RUN, Tracer, sorted};
 use crate::exact::record::{Passes, Record, Way};
 use crate::geometry::Upstream;
 
 /// No instructions handle more pixels side by side.
 const LANES: usize = 8;
 
-/// Rows of a block: its depths fit the first-level cache.
-pub const BLOCK_ROWS: i32 = 16;
+/// Pixels of the body's rectangle for each face, at most. Where faces cover more, quotients at once are as quick as depths that are
+/// gone through again.
+pub const MOST_PIXELS: usize = 8;
 
 /// A row of depths: lanes may reach beyond the block on either side.
 const PITCH: usize = BLOCK_COLUMNS as usize + 2 * LANES;
@@ -46,15 +47,10 @@ const SMALL: i32 = 4;
 const SIDE_ERROR: f64 = 1e-12;
 
 /// The depths of a block's rays where they enter and where they leave. Unset between blocks.
+#[derive(Default)]
 pub struct Depths {
     planes: Vec<f64>,
     is_any_set: bool,
-}
-
-impl Default for Depths {
-    fn default() -> Self {
-        Self { planes: Vec::new(), is_any_set: false }
-    }
 }
 
 /// The plane of depths of a way.

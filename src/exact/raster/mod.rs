@@ -76,6 +76,8 @@ struct Seen {
     /// The pixels on edge-on faces, in order. `None` if they are to be found in passing.
     edge_on: Option<Vec<EdgeOn>>,
     source_is_inside: bool,
+    /// Whether faces cover few pixels each, and the source is not inside: see `chords`.
+    is_fine: bool,
     crossing_error: f64,
     place_error: f64,
     care: Care,
@@ -104,7 +106,8 @@ impl<'a> RasterView<'a> {
         Self { surface, grid: *grid, form, is_convex: false }
     }
 
-    /// As [`new`](Self::new), for a surface that is convex but for rounding: its rays go in and out once, which is quicker.
+    /// As [`new`](Self::new), for a surface that is convex but for rounding: its rays go in and out once, which is quicker
+    /// where faces are small. Lengths may then differ in the last bits from those beside [`Pierced`](super::Pierced) faces.
     pub fn of_convex(surface: &'a ClosedMesh, grid: &RayGrid) -> Self {
         Self { is_convex: true, ..Self::new(surface, grid) }
     }
@@ -249,7 +252,9 @@ impl Seen {
         let bounds = if source_is_inside { window.clone() } else { around.grown(1).intersection(window) };
         let mut edge_on: Vec<EdgeOn> = sorted.iter().flat_map(|part| &part.edge_on).copied().collect();
         edge_on::sort(&mut edge_on);
+        let pixels = bounds.columns.len() * bounds.rows.len();
         Some(Self {
+            is_fine: !source_is_inside && pixels <= chords::MOST_PIXELS * corners.len(),
             projection,
             places,
             bounds,

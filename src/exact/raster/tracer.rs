@@ -6,7 +6,7 @@
 use std::ops::Range;
 
 use super::cells::{CellFace, Pixels};
-use super::chords::{self, Depths, measure};
+use super::chords::{Depths, measure};
 use super::edge_on::{self, EdgeOn, is_edge_on, is_listed, pixels_along};
 use super::face::{Edge, Slope, order};
 use super::{RasterView, Seen, round};
@@ -15,7 +15,7 @@ use crate::geometry::Region;
 
 /// A region is traced in blocks whose lists stay in the cache.
 pub const BLOCK_COLUMNS: i32 = 128;
-const BLOCK_ROWS: i32 = 64;
+pub const BLOCK_ROWS: i32 = 64;
 
 /// Crossings reported at a time.
 pub const RUN: usize = 64;
@@ -89,16 +89,15 @@ impl<'v, 'a> Tracer<'v, 'a> {
 
     #[inline(always)]
     fn trace_blocks<S: pulp::Simd, R: Record>(&mut self, simd: S, record: &mut R) {
-        let has_chords = self.view.is_convex && !self.seen.source_is_inside && !R::ASKS_FACES;
+        let is_by_chords = self.view.is_convex && self.seen.is_fine && !R::ASKS_FACES;
         let common = self.asked.intersection(&self.seen.bounds);
-        let block_rows = if has_chords { chords::BLOCK_ROWS } else { BLOCK_ROWS };
-        for top in common.rows.clone().step_by(block_rows as usize) {
+        for top in common.rows.clone().step_by(BLOCK_ROWS as usize) {
             for left in common.columns.clone().step_by(BLOCK_COLUMNS as usize) {
                 let block = Pixels {
                     columns: left..(left + BLOCK_COLUMNS).min(common.columns.end),
-                    rows: top..(top + block_rows).min(common.rows.end),
+                    rows: top..(top + BLOCK_ROWS).min(common.rows.end),
                 };
-                match (has_chords, self.seen.projection.is_cone()) {
+                match (is_by_chords, self.seen.projection.is_cone()) {
                     (true, true) => self.trace_block_of_chords::<true, S, R>(simd, &block, record),
                     (true, false) => self.trace_block_of_chords::<false, S, R>(simd, &block, record),
                     (false, true) => self.trace_block::<true>(&block, record),

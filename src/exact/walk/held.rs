@@ -1,5 +1,5 @@
 //! The face that the last ray of an image went through, ready for rays from the same source: whether they go through it too is
-//! three products with their directions, and where is one quotient.
+//! three products with their directions, and where is one quotient. What is held changes no bit of what walks would find.
 //!
 //! ```text
 //!             b        A ray from the source o passes the edge a–b on the inner side if its direction does the plane through
@@ -10,7 +10,8 @@
 
 use glam::DVec3;
 
-use super::{Face, STEEP, Walker};
+use super::{Face, Pass, STEEP, Seeds, Walker};
+use crate::geometry::Interval;
 use crate::geometry::numeric::gamma;
 
 /// A face, as rays from one source see it.
@@ -52,41 +53,86 @@ impl Held {
     }
 }
 
-/// One of the two walks of an image's rays, from each ray to the next.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Follower {
-    held: Option<Held>,
-    /// Rays that the last walk's face has served so far.
-    served: u32,
-    /// Rays that faces serve lately.
-    usual: u32,
+/// What is kept from ray to ray besides seeds.
+pub(super) trait Holding {
+    /// The way of the ray along `dir`, if it is known without a walk.
+    fn pass(&self, dir: DVec3) -> Option<Pass>;
+
+    /// Learns where walks began and ended.
+    fn walked(&mut self, walker: &Walker, from: Seeds, to: &Pass);
+
+    /// Begins a new row.
+    fn forget(&mut self);
 }
 
-/// Rays that a face must serve to be worth holding.
-const WORTH_HOLDING: u32 = 8;
+/// Nothing is held.
+pub(super) struct Alone;
 
-impl Follower {
-    /// Where the ray along `dir` goes through the face held, if there is one and it does; and that face.
+impl Holding for Alone {
     #[inline(always)]
-    pub fn crossing(&mut self, dir: DVec3) -> Option<(f64, u32)> {
-        let held = self.held.as_ref()?;
-        let t = held.crossing(dir)?;
-        self.served += 1;
-        Some((t, held.face))
+    fn pass(&self, _: DVec3) -> Option<Pass> {
+        None
     }
 
-    /// Learns that a walk went from one face to another, and holds it if that seems worth it.
+    #[inline(always)]
+    fn walked(&mut self, _: &Walker, _: Seeds, _: &Pass) {}
+
+    #[inline(always)]
+    fn forget(&mut self) {}
+}
+
+/// The faces of the entry and of the exit, for rays from one source.
+pub(super) struct Followers {
+    source: DVec3,
+    entry: Follower,
+    exit: Follower,
+}
+
+impl Followers {
+    pub fn new(source: DVec3) -> Self {
+        Self { source, entry: Follower::default(), exit: Follower::default() }
+    }
+}
+
+impl Holding for Followers {
+    #[inline(always)]
+    fn pass(&self, dir: DVec3) -> Option<Pass> {
+        let (entry, exit) = (self.entry.held.as_ref()?, self.exit.held.as_ref()?);
+        let chord = Interval::new(entry.crossing(dir)?, exit.crossing(dir)?)?;
+        Some(Pass { chord, entry_face: entry.face, exit_face: exit.face })
+    }
+
     #[inline]
-    pub fn walked(&mut self, walker: &Walker, source: DVec3, [from, to]: [u32; 2], sign: f64) {
-        if from == to {
-            self.served += 1;
-        } else {
-            (self.usual, self.served) = (self.served, 1);
+    fn walked(&mut self, walker: &Walker, from: Seeds, to: &Pass) {
+        self.entry.walked(walker, self.source, [from.entry, to.entry_face], -1.0);
+        self.exit.walked(walker, self.source, [from.exit, to.exit_face], 1.0);
+    }
+
+    fn forget(&mut self) {
+        (self.entry, self.exit) = Default::default();
+    }
+}
+
+/// The face of one of the walks.
+#[derive(Clone, Copy, Debug, Default)]
+struct Follower {
+    held: Option<Held>,
+    /// Walks that ended on the last one's face.
+    stayed: u32,
+}
+
+/// Walks that end on the same face before it is held.
+const WORTH_HOLDING: u32 = 2;
+
+impl Follower {
+    /// Learns that a walk went from one face to another, and holds that if walks stay there.
+    #[inline]
+    fn walked(&mut self, walker: &Walker, source: DVec3, [from, to]: [u32; 2], sign: f64) {
+        let is_held = self.held.is_some_and(|held| held.face == to);
+        if is_held {
+            return;
         }
-        if self.served.max(self.usual) >= WORTH_HOLDING && self.held.is_none_or(|held| held.face != to) {
-            self.held = Some(Held::new(walker, source, to, sign));
-        } else if from != to {
-            self.held = None;
-        }
+        self.stayed = if from == to { self.stayed + 1 } else { 0 };
+        self.held = (self.stayed >= WORTH_HOLDING).then(|| Held::new(walker, source, to, sign));
     }
 }

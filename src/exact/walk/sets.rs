@@ -2,7 +2,7 @@
 
 use std::hint::black_box;
 
-use super::held::Follower;
+use super::held::{Alone, Followers, Holding};
 use super::{Pass, Seeds, Unsure, Walker};
 use crate::exact::{Record, Way};
 use crate::geometry::{Interval, RayGrid, Region, Segment, Upstream};
@@ -13,6 +13,9 @@ const TOGETHER: usize = 32;
 /// Bodies of fewer faces stay in the second-level cache, where reading ahead gains nothing.
 const FACES_IN_CACHE: usize = 10_000;
 
+/// Bodies of as many faces have none that serves many rays of an image.
+const FINE_FACES: usize = 5_000;
+
 impl Walker {
     /// Records the crossings of each ray of `region`, numbered row by row; rays in doubt go to `other`.
     pub fn trace_grid<R: Record>(
@@ -20,23 +23,37 @@ impl Walker {
         grid: &RayGrid,
         region: &Region,
         record: &mut R,
+        other: impl FnMut(usize, &Segment, &mut R),
+    ) {
+        let is_coarse = self.faces.len() < FINE_FACES;
+        match grid.upstream() {
+            Upstream::Source(source) if is_coarse => {
+                self.trace_rows(grid, region, record, other, &mut Followers::new(source));
+            }
+            _ => self.trace_rows(grid, region, record, other, &mut Alone),
+        }
+    }
+
+    #[inline(always)]
+    fn trace_rows<R: Record>(
+        &self,
+        grid: &RayGrid,
+        region: &Region,
+        record: &mut R,
         mut other: impl FnMut(usize, &Segment, &mut R),
+        held: &mut impl Holding,
     ) {
         let mut of_row = None;
         let mut ray = 0;
         for row in region.rows.clone() {
             // Each row begins where the one above began.
             let (mut seeds, mut missed) = (of_row, true);
-            let mut followers = [Follower::default(); 2];
+            held.forget();
             for column in region.columns.clone() {
                 let target = grid.point(column, row);
                 let origin = grid.start_of(target);
                 let dir = target - origin;
-                if let Upstream::Source(_) = grid.upstream()
-                    && let [Some(entry), Some(exit)] = followers.each_mut().map(|f| f.crossing(dir))
-                    && let Some(chord) = Interval::new(entry.0, exit.0)
-                {
-                    let pass = Pass { chord, entry_face: entry.1, exit_face: exit.1 };
+                if let Some(pass) = held.pass(dir) {
                     note(record, ray, &pass, UNIT, dir.length());
                     missed = false;
                     ray += 1;
@@ -53,12 +70,8 @@ impl Walker {
                     answer
                 };
                 missed = answer == Ok(None);
-                if let (Some(from), Ok(Some(pass)), Upstream::Source(source)) =
-                    (before, answer, grid.upstream())
-                {
-                    let [entry, exit] = &mut followers;
-                    entry.walked(self, source, [from.entry, pass.entry_face], -1.0);
-                    exit.walked(self, source, [from.exit, pass.exit_face], 1.0);
+                if let (Some(from), Ok(Some(pass))) = (before, answer) {
+                    held.walked(self, from, &pass);
                 }
                 match answer {
                     // The direction reaches from the source to the target: the segment is 0 to 1.
