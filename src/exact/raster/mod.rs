@@ -12,6 +12,9 @@
 //! A vertex is rounded once, for all its faces, and what they cover is exact for its rounded place: a closed surface is
 //! seen as a closed complex of triangles, so that every ray goes in as often as out, whatever the pixels hit.
 //!
+//! Where a convex body's faces are small, only the two depths of a pixel are kept, and its length is one quotient
+//! (`chords`).
+//!
 //! Scan conversion with the usual fill rule (Pineda 1988, doi:10.1145/54852.378457), made exact as Shewchuk's adaptive
 //! predicates are: by a float where that can tell, by an exact sign where it cannot.
 
