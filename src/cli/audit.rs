@@ -188,7 +188,7 @@ fn setting_words(words: &[String]) -> Vec<String> {
     kept
 }
 
-fn shell_words(words: &[String]) -> String {
+pub(super) fn shell_words(words: &[String]) -> String {
     words.iter().map(|word| shell_word(word)).collect::<Vec<_>>().join(" ")
 }
 

@@ -3,6 +3,7 @@
 pub mod args;
 mod audit;
 mod check;
+mod dose;
 mod phantom;
 mod project;
 mod session;
@@ -24,6 +25,7 @@ pub fn run(cli: &Cli, session: &Session, out: &mut dyn Write) -> Result<Outcome>
     match &cli.command {
         Command::Project(args) => project::run(args, session, out).map(|()| Outcome::Done),
         Command::Audit(args) => audit::run(args, session, out),
+        Command::Dose(args) => dose::run(args, session, out).map(|()| Outcome::Done),
         Command::Check(args) => check::run(args, out),
         Command::Phantom(command) => phantom::run(command, session, out).map(|()| Outcome::Done),
         Command::Completions { shell } => {

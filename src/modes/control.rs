@@ -25,6 +25,11 @@ impl<'a> Control<'a> {
         Self { cancel: &NEVER, progress: &|_| {} }
     }
 
+    /// The same run, whose progress is told to nobody.
+    pub fn without_progress(&self) -> Self {
+        Self { cancel: self.cancel, progress: &|_| {} }
+    }
+
     /// # Errors
     /// [`Error::Interrupted`] once the run was asked to stop.
     pub fn check(&self) -> Result<()> {

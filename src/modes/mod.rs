@@ -2,6 +2,7 @@
 
 pub mod audit;
 mod control;
+pub mod dose;
 pub mod figures;
 pub mod oracles;
 pub mod project;

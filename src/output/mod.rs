@@ -4,12 +4,14 @@
 //! Projection ─► projection ─► png (to look at) │ metaimage, npy (to compute with)
 //! Scene      ─► phantom    ─► obj
 //! AuditReport ─► audit     ─► html, csv
+//! Study, DoseReport ─► dose ─► csv, json lines
 //! any record ─► json
 //!                  └─► atomic: temporary file beside the target ─► flush ─► sync ─► rename
 //! ```
 
 pub mod atomic;
 pub mod audit;
+pub mod dose;
 pub mod image;
 pub mod json;
 pub mod metaimage;
@@ -20,5 +22,5 @@ pub mod png;
 pub mod projection;
 pub mod sidecar;
 
-pub use atomic::{create_folder, write_atomically};
+pub use atomic::{AtomicFile, create_folder, remove_stale, write_atomically};
 pub use image::{FloatImage, Geometry, RgbImage, RgbaImage, image_of};
