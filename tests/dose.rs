@@ -584,3 +584,29 @@ fn lines_of_shots_run_from_source_to_target() {
     assert_eq!(all.paths[0].shot.source_mm, DVec3::new(1.0, 2.0, 3.0));
     assert_eq!(all.paths[0].shot.target_mm(), DVec3::new(40.0, 50.0, 60.0));
 }
+
+#[test]
+fn transmission_over_depth_falls_in_organs_only_and_ends_as_the_paths() {
+    let folder = folder(&[]);
+    let text = "scene = \"boxes.toml\"\n[beam]\nisocentre_mm = [30, -75, 0]\n[paths]\npoints = [{ at_mm = [30, -75, 0] }]\n\
+                beyond_mm = 500\n[spectrum]\nkvp = 100\n";
+    let study = study_in(folder.path(), text, &[], false).expect("a study");
+    let dose = Dose::new(&study, Method::Exact(None)).expect("ready");
+    let depths = dose.depths(0, 5.0).expect("a path");
+    let path = dose.path(0).expect("a path").paths[0].clone();
+    for pair in depths.windows(2) {
+        let (falls, step) = (
+            pair[1].transmission_photons < pair[0].transmission_photons,
+            pair[1].depth_mm - pair[0].depth_mm,
+        );
+        assert_eq!(pair[1].organ.is_some(), falls, "{pair:?}");
+        assert!(step > 0.0 && (pair[1].organ.is_none() || step <= 5.0 + 1e-9), "{pair:?}");
+    }
+    let (first, last) = (depths[0], depths[depths.len() - 1]);
+    assert_eq!((first.depth_mm, first.transmission_reference, last.depth_mm), (0.0, 1.0, path.length_mm));
+    near(last.transmission_photons, path.transmission_photons, 1e-12);
+    near(last.transmission_reference, path.transmission_reference, 1e-12);
+    // Bone takes the soft photons first: energy is left of more than of photons.
+    assert!(last.transmission_energy > last.transmission_photons);
+    assert!(dose.path(1).is_err() && dose.depths(0, 0.0).is_err());
+}

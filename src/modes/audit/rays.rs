@@ -270,7 +270,8 @@ mod tests {
         // chord over them is 4V/S (Cauchy–Crofton).
         let rays = 10 * BLOCK;
         let [body, far] = [0.0, 2.0].map(|x| ball_at(DVec3::new(x, 0.0, 0.0)));
-        let lines = Lines::of(&RaySet::Random { rays, seed: 5 }, vec![&body, &far]).expect("lines");
+        let set = RaySet::Random { rays, seed: 5 };
+        let lines = Lines::of(&set, vec![&body, &far]).expect("lines");
         let ball = lines.ball;
         let (mut hits, mut total) = (0.0, 0.0);
         for (source, path) in (0..10).flat_map(|block| lines.block(block)) {
@@ -292,7 +293,8 @@ mod tests {
     #[test]
     fn aimed_lines_hold_the_whole_scene_between_their_ends() {
         let [body, far] = [0.0, -4.0].map(|x| ball_at(DVec3::new(x, 0.0, 0.0)));
-        let lines = Lines::of(&RaySet::Adversarial { rays: 100, seed: 7 }, vec![&body, &far]).expect("lines");
+        let set = RaySet::Adversarial { rays: 100, seed: 7 };
+        let lines = Lines::of(&set, vec![&body, &far]).expect("lines");
         let sections = lines.sections();
         assert_eq!(sections.len(), Aim::ALL.len());
         for (name, blocks) in sections {

@@ -312,7 +312,7 @@ impl Block {
 }
 
 /// Takes photons along a stretch; returns the energy that they lose there, and that which is absorbed there, keV.
-fn pass(optics: &Optics, stretch: &Stretch, left: &mut [f64]) -> (f64, f64) {
+pub(super) fn pass(optics: &Optics, stretch: &Stretch, left: &mut [f64]) -> (f64, f64) {
     let organ = &optics.organs[stretch.organ];
     let length_mm = stretch.exit_mm - stretch.entry_mm;
     let (mut removed_kev, mut absorbed_kev) = (0.0, 0.0);

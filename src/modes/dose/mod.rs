@@ -25,6 +25,7 @@
 //! alone, and sums are added in a tree over blocks that the field alone decides.
 
 mod block;
+mod depth;
 mod lengths;
 mod optics;
 mod part;
@@ -52,6 +53,7 @@ use report::Collector;
 use sums::{Node, Nodes};
 
 pub use block::{Block, OrganRow, PathRow};
+pub use depth::DepthPoint;
 pub use part::{Part, Piece, Shard, join};
 pub use report::{
     BeamFigures, CaseFigures, DoseReport, FieldFigures, LengthBar, NOTICE, OrganErrors, OrganFigures,
