@@ -261,7 +261,7 @@ fn a_full_arc_about_a_cylinders_axis_is_the_same_from_every_angle() {
     let (_, report) = follow(&study, Method::Exact(None));
     assert_eq!((report.fields.len(), report.cases.len()), (48, 1));
     let first = &report.fields[0].figures;
-    assert!(first.absorbed_energy > 0.3 && first.transmitted_photons < 0.2);
+    assert!(first.absorbed_energy > 0.2 && first.transmitted_photons < 0.2);
     for field in &report.fields {
         // The cylinder is a prism of 5000 sides: radii differ by 1 − cos(π/5000) = 2e-7, lengths and exponents (up to 4) by some of it.
         let figures = &field.figures;
@@ -442,7 +442,7 @@ fn bad_studies_are_refused_with_their_line() {
         (format!("scene = \"giraffe.toml\"\n{point}"), Some(1), "cannot read"),
         (format!("scene = \"../boxes.toml\"\n{point}"), Some(1), "leaves the scene's folder"),
         (format!("{point}[beam]\nsad_mm = 0\n"), Some(4), "not positive"),
-        (format!("{point}[beam]\nisocentre = \"livver\"\n"), Some(4), "no organ `livver`"),
+        (format!("{point}[beam]\nisocentre = \"bonne\"\n"), Some(4), "no organ `bonne`"),
         (format!("{point}[beam]\nsource_mm = [0, 0, 0]\n"), Some(2), "the point is the source"),
         (
             format!("{point}[beam]\ncontrol_points = [{{ gantry_deg = [0, 1], weight = [1, 2, 3] }}]\n"),
@@ -455,12 +455,12 @@ fn bad_studies_are_refused_with_their_line() {
         (format!("{point}[spectrum]\nenergy_keV = 5\n"), Some(4), "outside the attenuation table"),
         (format!("reference_energy_keV = 3e4\n{point}"), Some(1), "outside the attenuation table"),
         (format!("{point}[spectrum]\nresponse = \"counting\"\n"), Some(3), "no photons"),
-        (format!("{point}[organ.livver]\ndensity_g_cm3 = 1\n"), Some(3), "no organ `livver`"),
-        (format!("{point}[organ.liver]\ndensity_g_cm3 = -1\n"), Some(4), "no density"),
+        (format!("{point}[organ.bonne]\ndensity_g_cm3 = 1\n"), Some(3), "no organ `bonne`"),
+        (format!("{point}[organ.bone]\ndensity_g_cm3 = -1\n"), Some(4), "no density"),
         (
-            "[paths]\npoints = [{ organ = \"liver\", at_mm = [0, 0, 0] }]\n".into(),
+            "[paths]\npoints = [{ organ = \"bone\", at_mm = [0, 0, 0] }]\n".into(),
             Some(2),
-            "not inside `liver`",
+            "not inside `bone`",
         ),
         ("[paths]\npoints = [{ name = \"nowhere\" }]\n".into(), Some(2), "no place"),
         ("[paths]\nfan = { width_mm = 1, points = 1 }\n".into(), Some(2), "no fan"),
@@ -481,12 +481,16 @@ fn bad_studies_are_refused_with_their_line() {
         (format!("{point}[[sweep]]\nbeam.gantry_deg = \"0..90\"\n"), Some(4), "no step"),
         ("[paths]\ncsv = \"nan.csv\"\n".into(), None, "nan.csv:3"),
     ] {
-        let error = study_in(folder.path(), &text, &[], false).expect_err(&text);
+        // Lines are those of the text; a small scene is quicker to build.
+        let settings: &[&str] = if text.starts_with("scene") { &[] } else { &["scene=boxes.toml"] };
+        let error = study_in(folder.path(), &text, settings, false).expect_err(&text);
         let told = error.to_string();
         assert!(told.contains(words), "{text}: {told}");
         assert_eq!(error.line(), line, "{text}: {told}");
     }
-    let error = study_in(folder.path(), point, &["beam.sad=-3"], false).expect_err("a setting").to_string();
+    let error = study_in(folder.path(), point, &["scene=boxes.toml", "beam.sad=-3"], false)
+        .expect_err("a setting")
+        .to_string();
     assert!(error.contains("--set beam.sad=-3") && error.contains("not positive"), "{error}");
 }
 

@@ -10,6 +10,7 @@ use std::ops::Range;
 
 use super::lengths::{Chords, Tracer};
 use super::optics::{Optics, PGY_CM2_PER_KEV_CM2_G, dot};
+use super::pass::pass;
 use super::sums::{FieldSums, OrganPart};
 use crate::error::{Error, Result};
 use crate::geometry::{Bounds, Segment};
@@ -182,7 +183,9 @@ impl Block {
         for stretch in &work.own {
             outside_mm += f64::max(stretch.entry_mm - reached_mm, 0.0);
             reached_mm = stretch.exit_mm;
-            let (removed_kev, absorbed_kev) = pass(at.optics, stretch, &mut work.left);
+            let length_mm = stretch.exit_mm - stretch.entry_mm;
+            let organ = &at.optics.organs[stretch.organ];
+            let (removed_kev, absorbed_kev) = pass(at.optics, organ, length_mm, &mut work.left);
             let of_path = &mut self.organs[organs_from..];
             let row = match of_path.iter().position(|row| row.organ == stretch.organ) {
                 Some(known) => &mut of_path[known],
@@ -199,7 +202,7 @@ impl Block {
                 }
             };
             row.segments += 1;
-            row.own_length_mm += stretch.exit_mm - stretch.entry_mm;
+            row.own_length_mm += length_mm;
             row.exit_mm = stretch.exit_mm;
             row.removed_kev += removed_kev;
             row.absorbed_kev += absorbed_kev;
@@ -309,20 +312,4 @@ impl Block {
             sums.organs[row.organ].add(&part, at.case.histogram_bin_mm);
         }
     }
-}
-
-/// Takes photons along a stretch; returns the energy that they lose there, and that which is absorbed there, keV.
-pub(super) fn pass(optics: &Optics, stretch: &Stretch, left: &mut [f64]) -> (f64, f64) {
-    let organ = &optics.organs[stretch.organ];
-    let length_mm = stretch.exit_mm - stretch.entry_mm;
-    let (mut removed_kev, mut absorbed_kev) = (0.0, 0.0);
-    let bins = left.iter_mut().zip(&organ.mu_bins_per_mm).zip(&organ.absorbed_kev).zip(&optics.energies_kev);
-    for (((left, mu_per_mm), absorbed), energy) in bins {
-        let behind = *left * (-mu_per_mm * length_mm).exp();
-        let lost = *left - behind;
-        *left = behind;
-        removed_kev += energy * lost;
-        absorbed_kev += absorbed * lost;
-    }
-    (removed_kev, absorbed_kev)
 }

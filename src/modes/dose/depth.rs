@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
-use super::block::{Block, pass};
+use super::block::Block;
 use super::optics::dot;
+use super::pass::pass;
 use super::{Dose, Optics};
 use crate::error::{Error, Result};
 use crate::physics::Stretch;
@@ -66,7 +67,7 @@ impl Dose<'_> {
             let at = |step: u32| stretch.entry_mm + length_mm * f64::from(step) / f64::from(steps);
             for step in 0..steps {
                 let part = Stretch { organ: stretch.organ, entry_mm: at(step), exit_mm: at(step + 1) };
-                pass(&optics, &part, &mut left);
+                pass(&optics, &optics.organs[part.organ], part.exit_mm - part.entry_mm, &mut left);
                 mu_length += optics.organs[part.organ].mu_per_mm * (part.exit_mm - part.entry_mm);
                 points.push(point(&optics, part.exit_mm, Some(part.organ), mu_length, &left));
             }

@@ -29,6 +29,7 @@ mod depth;
 mod lengths;
 mod optics;
 mod part;
+mod pass;
 mod report;
 mod sums;
 

@@ -1,5 +1,6 @@
 //! What organs do to a case's photons, per millimetre.
 
+use super::pass::LANES;
 use crate::error::Result;
 use crate::physics::Material;
 use crate::study::Case;
@@ -8,9 +9,9 @@ use crate::study::Case;
 pub const PGY_CM2_PER_KEV_CM2_G: f64 = 0.160_217_663_4;
 
 /// A case's organs before its photons.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Optics {
-    /// Of each bin of the spectrum: its energy, keV.
+    /// Of each bin of the spectrum, and of some without photons behind them: its energy, keV.
     pub energies_kev: Vec<f64>,
     /// Its share of the photons.
     pub shares: Vec<f64>,
@@ -26,7 +27,7 @@ pub struct Optics {
 }
 
 /// One organ before the photons.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct OrganOptics {
     /// Mass thickness, g/cm² per mm.
     pub g_cm2_per_mm: f64,
@@ -74,7 +75,7 @@ impl Optics {
             }
             Ok(organ)
         };
-        Ok(Self {
+        let mut optics = Self {
             organs: case.organs.iter().map(organ).collect::<Result<_>>()?,
             water_mu_en_rho: energies_kev.iter().map(|&e| water.mu_en_rho_cm2_g(e)).collect::<Result<_>>()?,
             mean_energy_kev: dot(&energies_kev, &shares),
@@ -82,7 +83,20 @@ impl Optics {
             energies_kev,
             shares,
             signals,
-        })
+        };
+        optics.fill_up();
+        Ok(optics)
+    }
+
+    /// Adds bins without photons until there are a multiple of [`LANES`].
+    fn fill_up(&mut self) {
+        let bins = self.energies_kev.len().next_multiple_of(LANES);
+        let of_organs = self
+            .organs
+            .iter_mut()
+            .flat_map(|o| [&mut o.mu_bins_per_mm, &mut o.absorbed_kev, &mut o.mu_en_rho]);
+        let own = [&mut self.energies_kev, &mut self.shares, &mut self.signals, &mut self.water_mu_en_rho];
+        of_organs.chain(own).for_each(|values| values.resize(bins, 0.0));
     }
 }
 
