@@ -122,7 +122,8 @@ fn run_part(
         && let Some(part) = output::read_part(&folder)?
         && part.is_of(dose.study(), method.name())
     {
-        return print(out, &format!("part {shard} is there already: {}\n", folder.display()));
+        let told = format!("part {shard} is there already: {}\n", folder.display());
+        return if args.json { Ok(()) } else { print(out, &told) };
     }
     session.begin_writing();
     create_folder(&folder)?;
@@ -130,6 +131,9 @@ fn run_part(
     let part =
         follow(dose, shard, &folder, args, session, |keeper, control| keeper.run_part(dose, shard, control))?;
     output::write_part(&folder, &part)?;
+    if args.json {
+        return print(out, &json::text(&Plan::of(dose, shard))?);
+    }
     let paths = part.paths;
     print(out, &format!("part {shard}: {paths} paths; when all parts are there, join them with --join\n"))
 }

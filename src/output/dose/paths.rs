@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::rows::{Format, Rows};
 use crate::error::Result;
-use crate::modes::dose::{Block, Keeper, OrganRow, PathRow};
+use crate::modes::dose::{Block, Keeper, PathRow};
 use crate::output::AtomicFile;
 use crate::study::{Case, Study};
 
@@ -144,7 +144,9 @@ impl At<'_> {
         for organ in &block.organs[path.organs.clone()] {
             self.begin(path, rows);
             rows.word(name(organ.organ)).count(organ.order.into()).count(organ.segments.into());
-            rows.word(&places(path, organ, block));
+            // The places of its stretches in the path's sequence, from 1.
+            let places = (1..).zip(&block.stretches[path.stretches.clone()]);
+            rows.counts(places.filter(|(_, stretch)| stretch.organ == organ.organ).map(|(place, _)| place));
             rows.number(organ.own_length_mm).number(organ.entry_mm).number(organ.exit_mm);
             rows.number(organ.mass_g_cm2).number(organ.mu_length);
             rows.number(organ.water_by_mu_mm).number(organ.water_by_electrons_mm);
@@ -162,20 +164,6 @@ impl At<'_> {
             rows.number(stretch.exit_mm - stretch.entry_mm).end();
         }
     }
-}
-
-/// The places of an organ's stretches in the path's sequence, from 1: `2;4`.
-fn places(path: &PathRow, organ: &OrganRow, block: &Block) -> String {
-    let mut text = String::new();
-    for (place, stretch) in (1_u32..).zip(&block.stretches[path.stretches.clone()]) {
-        if stretch.organ == organ.organ {
-            if !text.is_empty() {
-                text.push(';');
-            }
-            text.push_str(&place.to_string());
-        }
-    }
-    text
 }
 
 /// What is worth saying of a path.

@@ -25,6 +25,8 @@ impl Format {
 pub struct Rows {
     format: Format,
     heads: &'static [&'static str],
+    /// The heads as JSON has them.
+    keys: Vec<String>,
     column: usize,
     text: String,
     digits: zmij::Buffer,
@@ -33,15 +35,22 @@ pub struct Rows {
 impl Rows {
     /// No rows yet.
     pub fn new(format: Format, heads: &'static [&'static str]) -> Self {
-        Self { format, heads, column: 0, text: String::new(), digits: zmij::Buffer::new() }
+        let keys = match format {
+            Format::Csv => Vec::new(),
+            Format::JsonLines => heads.iter().map(|head| json_text(head)).collect(),
+        };
+        Self { format, heads, keys, column: 0, text: String::new(), digits: zmij::Buffer::new() }
     }
 
     /// What a file begins with: the line of heads of a CSV, with those of columns that follow.
     pub fn head(&self, more: &[String]) -> String {
         match self.format {
             Format::Csv => {
-                let heads =
-                    self.heads.iter().map(|head| (*head).to_owned()).chain(more.iter().map(|m| field(m)));
+                let heads = self
+                    .heads
+                    .iter()
+                    .map(|head| (*head).to_owned())
+                    .chain(more.iter().map(|m| field(m).into_owned()));
                 heads.collect::<Vec<_>>().join(",") + "\n"
             }
             Format::JsonLines => String::new(),
@@ -53,23 +62,19 @@ impl Rows {
         self.text
     }
 
+    /// Begins the next field.
     fn next(&mut self) {
-        let head = self.heads[self.column];
-        self.begin(head);
-    }
-
-    fn begin(&mut self, head: &str) {
-        let is_first = self.column == 0;
+        let (column, is_first) = (self.column, self.column == 0);
+        self.column += 1;
         match self.format {
             Format::Csv if is_first => {}
             Format::Csv => self.text.push(','),
             Format::JsonLines => {
                 self.text.push(if is_first { '{' } else { ',' });
-                self.text.push_str(&json_text(head));
+                self.text.push_str(&self.keys[column]);
                 self.text.push(':');
             }
         }
-        self.column += 1;
     }
 
     /// Words.
@@ -89,7 +94,27 @@ impl Rows {
     /// A whole number.
     pub fn count(&mut self, count: u64) -> &mut Self {
         self.next();
-        // Without the detour of a formatter: there are some of them in each of very many rows.
+        self.put_count(count);
+        self
+    }
+
+    /// Whole numbers in one field, as words: `2;4`.
+    pub fn counts(&mut self, counts: impl Iterator<Item = u64>) -> &mut Self {
+        self.next();
+        let quote = if self.format == Format::JsonLines { "\"" } else { "" };
+        self.text.push_str(quote);
+        for (i, count) in counts.enumerate() {
+            if i > 0 {
+                self.text.push(';');
+            }
+            self.put_count(count);
+        }
+        self.text.push_str(quote);
+        self
+    }
+
+    /// Without the detour of a formatter: there are some of them in each of very many rows.
+    fn put_count(&mut self, count: u64) {
         let (mut digits, mut at, mut rest) = ([0_u8; 20], 20, count);
         loop {
             at -= 1;
@@ -100,7 +125,6 @@ impl Rows {
             }
         }
         self.text.extend(digits[at..].iter().map(|digit| char::from(*digit)));
-        self
     }
 
     /// A number; nothing if it is not finite.
@@ -128,7 +152,14 @@ impl Rows {
 
     /// A swept parameter's value, under its own head.
     pub fn value(&mut self, head: &str, value: &toml::Value) -> &mut Self {
-        self.begin(head);
+        if self.format == Format::JsonLines {
+            self.text.push_str(if self.column == 0 { "{" } else { "," });
+            self.text.push_str(&json_text(head));
+            self.text.push(':');
+        } else if self.column > 0 {
+            self.text.push(',');
+        }
+        self.column += 1;
         match (value, self.format) {
             (toml::Value::String(word), _) => self.put_word(word),
             (value, Format::Csv) => self.put_word(&value.to_string()),
