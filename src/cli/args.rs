@@ -1,6 +1,7 @@
 //! What can be said on the command line.
 
 mod audit;
+mod bench;
 mod dose;
 
 use std::path::PathBuf;
@@ -10,6 +11,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use crate::output::png::Polarity;
 use crate::physics::DetectorResponse;
 pub use audit::{AuditArgs, RayArgs};
+pub use bench::{BenchCommand, CurveArgs, RunArgs, ScaleArgs};
 pub use dose::{DoseArgs, FormatArg, TableArg};
 
 /// Exact intersection lengths of rays with organs: projection images of phantoms, with their numbers.
@@ -39,6 +41,9 @@ pub enum Command {
     Project(Box<ProjectArgs>),
     /// Say how wrong lengths are: each ray against exact clipping, by organ, kind of error and place.
     Audit(Box<AuditArgs>),
+    /// Run time against error on your scene and machine: which method and setting to use.
+    #[command(subcommand)]
+    Bench(BenchCommand),
     /// Follow the paths of a dose study: lengths, attenuation and absorption in each organ, by path, field and case.
     ///
     /// Primary radiation only: no scatter, not for clinical use.

@@ -7,15 +7,14 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::args::{DoseArgs, FormatArg, TableArg};
-use super::audit::shell_words;
 use super::project::method;
-use super::{Session, print};
+use super::{Session, command_line, print};
 use crate::error::{Error, Result};
 use crate::modes::Control;
 use crate::modes::dose::{self, CaseFigures, Dose, DoseReport, Keeper, NOTICE, NoPaths, Shard, StudyWords};
 use crate::modes::project::Method;
-use crate::output::audit::short;
 use crate::output::dose::{self as output, Format, PathFiles, Table};
+use crate::output::page::short;
 use crate::output::{create_folder, json, remove_stale};
 use crate::study::Study;
 
@@ -156,8 +155,7 @@ fn join(study: &Study, method: Method, args: &DoseArgs, session: &Session) -> Re
 }
 
 fn finish(mut report: DoseReport, args: &DoseArgs, out: &mut dyn Write) -> Result<()> {
-    let words: Vec<String> = std::env::args().skip(1).collect();
-    report.command = format!("chordfield {}", shell_words(&words));
+    report.command = command_line();
     output::write(&args.output, &report, &formats(args))?;
     print(out, &if args.json { json::text(&report)? } else { summary(&report, &args.output) })
 }
@@ -202,7 +200,7 @@ impl Plan {
     fn text(&self) -> String {
         let swept = match self.study.parameters.is_empty() {
             true => String::new(),
-            false => format!(" (swept: {})", self.study.parameters.join(", ")),
+            false => format!(" (by {})", self.study.parameters.join(", ")),
         };
         let mut text = format!(
             "{} in {}: {} paths in {} fields of {} cases{swept}\n",

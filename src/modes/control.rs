@@ -25,9 +25,9 @@ impl<'a> Control<'a> {
         Self { cancel: &NEVER, progress: &|_| {} }
     }
 
-    /// The same run, whose progress is told to nobody.
+    /// The same flag to stop by, for work whose progress is told otherwise.
     pub fn without_progress(&self) -> Self {
-        Self { cancel: self.cancel, progress: &|_| {} }
+        Self { progress: &|_| {}, ..*self }
     }
 
     /// # Errors

@@ -14,6 +14,7 @@ mod paths;
 mod plane;
 mod schema;
 mod sweep;
+mod values;
 
 use std::path::Path;
 
