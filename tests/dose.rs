@@ -321,7 +321,8 @@ fn sweeps_have_as_many_cases_fields_and_paths_as_they_say() {
     assert_eq!((all.paths.len(), report.paths, report.cases.len()), (432, 432, 12));
     assert!(all.paths.iter().enumerate().all(|(i, path)| path.number == i as u64));
     let zipped =
-        study_in(folder.path(), text, &["beam.gantry=0,1", "beam.collimator=5,6"], true).expect("a study");
+        study_in(folder.path(), text, &["beam.patient_position=HFS,FFS", "beam.collimator=5,6"], true)
+            .expect("a study");
     assert_eq!(zipped.cases().len(), 12);
     // The number of pixels of a swept grid changes from case to case.
     let grids = study_in(folder.path(), text, &["paths.grid.points=[1,1],[2,5]"], false).expect("a study");

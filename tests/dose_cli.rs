@@ -66,6 +66,12 @@ fn bad_studies_are_refused_with_their_line() {
         assert!(told.contains(words), "{text}: {told}");
         assert_eq!(error.line(), line, "{text}: {told}");
     }
+    // An arc's own angles would silently win over a sweep of the beam's; without control points it counts.
+    let arc = format!("{point}[beam]\ncontrol_points = [{{ gantry_deg = \"0..90:30\" }}]\n");
+    let settings = ["scene=boxes.toml", "beam.gantry=0..360:90", "beam.control_points=[]"];
+    let error = study_in(folder.path(), &arc, &settings[..2], false).expect_err("an arc").to_string();
+    assert!(error.contains("--set beam.gantry=0..360:90") && error.contains("no effect"), "{error}");
+    assert_eq!(study_in(folder.path(), &arc, &settings, false).expect("a sweep").fields().len(), 4);
     let error = study_in(folder.path(), point, &["scene=boxes.toml", "beam.sad=-3"], false)
         .expect_err("a setting")
         .to_string();

@@ -90,12 +90,12 @@ pub struct MachineSpec {
     pub isocentre_mm: Option<[f64; 3]>,
     /// The organ whose centroid is the isocentre.
     pub isocentre: Option<String>,
-    /// Gantry φ, degrees.
-    pub gantry_deg: f64,
+    /// Gantry φ, degrees; 0 if left out, as the others.
+    pub gantry_deg: Option<f64>,
     /// Couch θ, degrees.
-    pub couch_deg: f64,
+    pub couch_deg: Option<f64>,
     /// Collimator χ, degrees.
-    pub collimator_deg: f64,
+    pub collimator_deg: Option<f64>,
     /// How the patient lies.
     pub patient_position: PatientPosition,
     /// A source in place of angles, patient LPS, mm.

@@ -29,9 +29,16 @@ impl Builder<'_> {
             (None, given) => DVec3::from(given.unwrap_or_default()),
         };
         self.finite(&["beam", "isocentre_mm"], &isocentre_mm.to_array())?;
-        let own = [beam.gantry_deg, beam.couch_deg, beam.collimator_deg];
-        for (key, angle) in ["gantry_deg", "couch_deg", "collimator_deg"].into_iter().zip(own) {
-            self.finite(&["beam", key], &[angle])?;
+        let given = [beam.gantry_deg, beam.couch_deg, beam.collimator_deg];
+        let own = given.map(Option::unwrap_or_default);
+        for (axis, key) in ["gantry_deg", "couch_deg", "collimator_deg"].into_iter().enumerate() {
+            self.finite(&["beam", key], &[own[axis]])?;
+            if given[axis].is_some() && has_no_use_of(axis, spec) {
+                let problem =
+                    "has no effect: control points, sources placed by hand and listed paths have their own";
+                let remedy = "drop it; to sweep it in place of an arc's, set beam.control_points=[]";
+                return Err(self.at(&["beam", key], problem, remedy));
+            }
         }
         let machine = |[gantry_deg, couch_deg, collimator_deg]: [f64; 3]| {
             let patient_position = beam.patient_position;
@@ -102,4 +109,14 @@ impl Builder<'_> {
             })
             .collect())
     }
+}
+
+/// Whether the beam's own angle about an axis (gantry, couch, collimator) would go unheard.
+fn has_no_use_of(axis: usize, spec: &StudySpec) -> bool {
+    let points = &spec.beam.control_points;
+    let has_angle = |point: &ControlPointSpec| {
+        [&point.gantry_deg, &point.couch_deg, &point.collimator_deg][axis].is_some()
+    };
+    let is_list = spec.paths.segments_mm.is_some() || spec.paths.csv.is_some();
+    is_list || spec.beam.source_mm.is_some() || (!points.is_empty() && points.iter().all(has_angle))
 }
