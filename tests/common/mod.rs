@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use chordfield::scene::{Folder, Scene, SceneText};
+use chordfield::study::Study;
 
 /// The scene of a TOML text.
 pub fn scene(toml: &str) -> chordfield::Result<Scene> {
@@ -35,6 +36,39 @@ opacity = 0.5
 shape = {{ kind = "ellipsoid", half_axes_mm = [20, 15, 10], faces = 400, move_mm = [10, 5, -8] }}
 "##
     )
+}
+
+/// A water box of 100 × 200 × 300 mm about the origin, with a bone box on its left, near the front.
+pub const BOXES: &str = r##"
+name = "boxes"
+[spectrum]
+energy_keV = 60
+[[organ]]
+name = "water"
+material = "water"
+density_g_cm3 = 1.0
+shape = { kind = "box", min_mm = [-50, -100, -150], max_mm = [50, 100, 150] }
+[[organ]]
+name = "bone"
+material = "bone_cortical"
+density_g_cm3 = 1.92
+shape = { kind = "box", min_mm = [20, -90, -20], max_mm = [40, -60, 20] }
+"##;
+
+/// A folder with the scene `boxes.toml` and others.
+pub fn folder(scenes: &[(&str, &str)]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, text) in scenes.iter().chain(&[("boxes.toml", BOXES)]) {
+        std::fs::write(folder.path().join(name), text).expect("a file");
+    }
+    folder
+}
+
+/// The study `text`, as if it lay in `folder`.
+pub fn study_in(folder: &Path, text: &str, settings: &[&str], zip: bool) -> chordfield::Result<Study> {
+    let settings: Vec<String> = settings.iter().map(|s| (*s).into()).collect();
+    let file = folder.join("study.toml");
+    Study::build(&SceneText::new("study.toml", text), &Folder::of(&file), &settings, zip)
 }
 
 /// A MetaImage, read by its specification.

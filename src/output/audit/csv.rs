@@ -1,5 +1,6 @@
 //! An audit's figures as CSV (RFC 4180), with units in the heads of columns.
 
+use std::borrow::Cow;
 use std::fmt::Write as _;
 
 use crate::modes::audit::{AuditReport, OrganFigures};
@@ -91,9 +92,9 @@ fn numbers(f: &Figures) -> String {
 }
 
 /// A text as one field, in quotes where it must be.
-fn field(text: &str) -> String {
+pub fn field(text: &str) -> Cow<'_, str> {
     if text.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
+        format!("\"{}\"", text.replace('"', "\"\"")).into()
     } else {
         text.into()
     }
