@@ -45,5 +45,6 @@ pub mod output;
 pub mod physics;
 pub mod ritree;
 pub mod scene;
+pub mod study;
 
 pub use error::{Error, Result};

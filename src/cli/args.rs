@@ -2,6 +2,7 @@
 
 mod audit;
 mod bench;
+mod dose;
 
 use std::path::PathBuf;
 
@@ -11,6 +12,7 @@ use crate::output::png::Polarity;
 use crate::physics::DetectorResponse;
 pub use audit::{AuditArgs, RayArgs};
 pub use bench::{BenchCommand, CurveArgs, RunArgs, ScaleArgs};
+pub use dose::{DoseArgs, FormatArg, TableArg};
 
 /// Exact intersection lengths of rays with organs: projection images of phantoms, with their numbers.
 ///
@@ -42,6 +44,10 @@ pub enum Command {
     /// Run time against error on your scene and machine: which method and setting to use.
     #[command(subcommand)]
     Bench(BenchCommand),
+    /// Follow the paths of a dose study: lengths, attenuation and absorption in each organ, by path, field and case.
+    ///
+    /// Primary radiation only: no scatter, not for clinical use.
+    Dose(Box<DoseArgs>),
     /// Say whether scenes or mesh files can be projected, and if not, what to do about it.
     Check(CheckArgs),
     /// The phantoms that come with the program.
@@ -116,6 +122,15 @@ pub struct MethodArgs {
     /// By RI-trees (Atalay & Mount) that interpolate exact samples, or every length exactly.
     #[arg(long, value_enum, default_value_t = MethodArg::Ritree)]
     pub method: MethodArg,
+    /// How trees are grown.
+    #[command(flatten)]
+    pub trees: TreeArgs,
+}
+
+/// How RI-trees are grown.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Method")]
+pub struct TreeArgs {
     /// RI-tree: a cell splits if its middle is interpolated worse than this, in half the longest side of the organ's box.
     #[arg(long, value_name = "D", default_value_t = 0.05, allow_negative_numbers = true)]
     pub distance_threshold: f64,

@@ -4,6 +4,7 @@ pub mod args;
 mod audit;
 mod bench;
 mod check;
+mod dose;
 mod phantom;
 mod project;
 mod session;
@@ -27,6 +28,7 @@ pub fn run(cli: &Cli, session: &Session, out: &mut dyn Write) -> Result<Outcome>
         Command::Project(args) => project::run(args, session, out).map(|()| Outcome::Done),
         Command::Audit(args) => audit::run(args, session, out),
         Command::Bench(command) => bench::run(command, session, out).map(|()| Outcome::Done),
+        Command::Dose(args) => dose::run(args, session, out).map(|()| Outcome::Done),
         Command::Check(args) => check::run(args, out),
         Command::Phantom(command) => phantom::run(command, session, out).map(|()| Outcome::Done),
         Command::Completions { shell } => {

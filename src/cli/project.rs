@@ -13,7 +13,7 @@ use crate::modes::Control;
 use crate::modes::project::{Method, Projector, QueryCounts, RayCounts, TreeSettings, Wanted};
 use crate::output::projection::{self, Products};
 use crate::output::sidecar::{Sidecar, Summary, TreeSummary, ViewRecord};
-use crate::output::{create_folder, json};
+use crate::output::{create_folder, json, remove_stale};
 use crate::physics::{PhotonNoise, Spectrum};
 use crate::ritree::Parameters;
 use crate::scene::beam::{BeamKind, BeamSpec, DetectorSpec};
@@ -94,14 +94,6 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
         print(out, &json::text(summary)?)?;
     }
     Ok(())
-}
-
-/// Removes an earlier run's record, which would describe files that are about to change.
-pub fn remove_stale(record: &Path) -> Result<()> {
-    match std::fs::remove_file(record) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io("replace", record, e)),
-        _ => Ok(()),
-    }
 }
 
 /// The scene of a file, or the phantom of that name.
@@ -211,6 +203,7 @@ pub fn method(args: &MethodArgs) -> Result<Method> {
 
 /// As [`method`], for another name with the same settings.
 pub fn method_named(name: MethodArg, args: &MethodArgs) -> Result<Method> {
+    let args = &args.trees;
     let refuse = |name: &str, value: f64, remedy: &str| {
         Err(Error::input(name, format!("{value} does not serve"), remedy))
     };

@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use super::Line;
+
 /// An axis-aligned box, mm; empty until it is given a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
@@ -48,6 +50,14 @@ impl Bounds {
     /// The length of the box's diagonal, mm.
     pub fn diagonal(&self) -> f64 {
         self.size().length()
+    }
+
+    /// Whether `line` passes the ball around the box, so that it may meet the box. A millionth more than the radius is far
+    /// above rounding.
+    pub fn ball_meets(&self, line: &Line) -> bool {
+        let to_centre = self.centre() - line.origin();
+        let reach = 0.5 * self.diagonal() * (1.0 + 1e-6);
+        to_centre.cross(line.dir()).length_squared() <= reach * reach
     }
 
     /// The eight corners.

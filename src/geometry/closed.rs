@@ -141,6 +141,11 @@ impl ClosedMesh {
         self.mesh.signed_volume()
     }
 
+    /// The centre of mass of the enclosed volume, mm. It may lie outside a body that is not convex.
+    pub fn centroid_mm(&self) -> DVec3 {
+        self.mesh.centroid_mm()
+    }
+
     /// On which side of the surface `point` lies. Exact.
     pub fn side_of(&self, point: DVec3) -> Side {
         side_of_surface(&self.mesh, &self.tree, point)

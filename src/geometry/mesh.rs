@@ -39,6 +39,20 @@ impl TriMesh {
         self.triangles().map(|[a, b, c]| (a - apex).dot((b - apex).cross(c - apex)) / 6.0).sum()
     }
 
+    /// The centre of mass of what the surface encloses, mm, by tetrahedra from one vertex: far from the origin too, none is
+    /// much larger than the body. Not finite if nothing is enclosed.
+    pub fn centroid_mm(&self) -> DVec3 {
+        let base = self.vertices.first().copied().unwrap_or_default();
+        let (mut volume, mut moment) = (0.0, DVec3::ZERO);
+        for corners in self.triangles() {
+            let [a, b, c] = corners.map(|corner| corner - base);
+            let six_volumes = a.dot(b.cross(c));
+            volume += six_volumes;
+            moment += six_volumes * (a + b + c);
+        }
+        base + moment / (4.0 * volume)
+    }
+
     /// The surface's area, mm².
     pub fn area(&self) -> f64 {
         self.triangles().map(|[a, b, c]| 0.5 * (b - a).cross(c - a).length()).sum()
@@ -79,6 +93,17 @@ impl TriMesh {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_centroid_of_a_cube_far_away_is_its_middle_and_children_weigh_by_volume() {
+        use crate::geometry::primitives::cube;
+        let far = DVec3::new(1e4, -2e4, 3e4);
+        let mut mesh = cube(2.0).map_vertices(|v| v + far);
+        assert!((mesh.centroid_mm() - far).length() < 1e-9);
+        // Eight times the volume, nine units away.
+        mesh.append(&cube(4.0).map_vertices(|v| v + far + DVec3::new(9.0, 0.0, 0.0)));
+        assert!((mesh.centroid_mm() - far - DVec3::new(8.0, 0.0, 0.0)).length() < 1e-9);
+    }
 
     #[test]
     fn unused_vertices_go_and_the_rest_is_numbered_by_first_use() {

@@ -12,7 +12,7 @@
 
 use std::ops::AddAssign;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Bits of the mantissa that tell bins apart: 2⁵ = 32 bins per octave.
 const MANTISSA_BITS: u32 = 5;
@@ -230,7 +230,7 @@ fn wilson(hits: f64, n: f64) -> [f64; 2] {
 }
 
 /// What errors amount to, in their own unit. All but `bias` are of magnitudes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Figures {
     /// How many.
     pub compared: u64,
@@ -262,7 +262,7 @@ pub struct Figures {
 }
 
 /// Bounds for the whole of which a random sample was seen, errors taken as independent.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Confidence {
     /// The probability with which bounds are meant to hold.
     pub level: f64,

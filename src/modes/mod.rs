@@ -3,6 +3,7 @@
 pub mod audit;
 pub mod bench;
 mod control;
+pub mod dose;
 pub mod figures;
 pub mod oracles;
 pub mod project;

@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::{Error, Result};
 
@@ -17,6 +17,53 @@ use crate::{Error, Result};
 /// device), if `content` fails, or if the disk refuses (also at the last flush). Then an old file at `path`
 /// is as it was, and the temporary file is gone.
 pub fn write_atomically(path: &Path, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<u64> {
+    let temporary = temporary_file_for(path)?;
+    let bytes = fill(temporary.as_file(), content).map_err(|e| Error::io("write", path, e))?;
+    temporary.persist(path).map_err(|e| Error::io("replace", path, e.error))?;
+    Ok(bytes)
+}
+
+/// A file that is written piece by piece over a long run, and appears at its path when it is [committed](Self::commit): whole,
+/// or not at all. Dropped before that, it leaves nothing.
+#[derive(Debug)]
+pub struct AtomicFile {
+    path: PathBuf,
+    out: BufWriter<tempfile::NamedTempFile>,
+}
+
+impl AtomicFile {
+    /// Begins the file that is to appear at `path`.
+    ///
+    /// # Errors
+    /// As [`write_atomically`].
+    pub fn begin(path: &Path) -> Result<Self> {
+        let temporary = temporary_file_for(path)?;
+        Ok(Self { path: path.to_owned(), out: BufWriter::with_capacity(1 << 16, temporary) })
+    }
+
+    /// Adds bytes at its end.
+    ///
+    /// # Errors
+    /// If the disk refuses.
+    pub fn append(&mut self, bytes: &[u8]) -> Result<()> {
+        self.out.write_all(bytes).map_err(|e| Error::io("write", &self.path, e))
+    }
+
+    /// Lets the file appear, flushed and synced, in place of one of that name.
+    ///
+    /// # Errors
+    /// If the disk refuses, also at the last flush; then nothing appears.
+    pub fn commit(self) -> Result<()> {
+        let Self { path, out } = self;
+        let temporary = out.into_inner().map_err(|e| Error::io("write", &path, e.into_error()))?;
+        temporary.as_file().sync_all().map_err(|e| Error::io("write", &path, e))?;
+        temporary.persist(&path).map_err(|e| Error::io("replace", &path, e.error))?;
+        Ok(())
+    }
+}
+
+/// A new file in the folder of `path`, to be renamed to it.
+fn temporary_file_for(path: &Path) -> Result<tempfile::NamedTempFile> {
     if path.metadata().is_ok_and(|about| !about.is_file()) {
         // Renaming onto a device would replace the device.
         let reason = io::Error::other("it exists and is not a regular file");
@@ -26,10 +73,7 @@ pub fn write_atomically(path: &Path, content: impl FnOnce(&mut dyn Write) -> io:
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
-    let temporary = temporary_file(folder).map_err(|e| Error::io("create", path, e))?;
-    let bytes = fill(temporary.as_file(), content).map_err(|e| Error::io("write", path, e))?;
-    temporary.persist(path).map_err(|e| Error::io("replace", path, e.error))?;
-    Ok(bytes)
+    temporary_file(folder).map_err(|e| Error::io("create", path, e))
 }
 
 /// Creates a folder and those above it, where they do not exist yet.
@@ -38,6 +82,17 @@ pub fn write_atomically(path: &Path, content: impl FnOnce(&mut dyn Write) -> io:
 /// If the system refuses, for example because a file is in the way.
 pub fn create_folder(path: &Path) -> Result<()> {
     std::fs::create_dir_all(path).map_err(|e| Error::io("create", path, e))
+}
+
+/// Removes an earlier run's record, which would describe files that are about to change.
+///
+/// # Errors
+/// If the system refuses.
+pub fn remove_stale(record: &Path) -> Result<()> {
+    match std::fs::remove_file(record) {
+        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(Error::io("replace", record, e)),
+        _ => Ok(()),
+    }
 }
 
 fn temporary_file(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
@@ -115,6 +170,21 @@ mod tests {
         assert_eq!(error.source().expect("a reason").to_string(), "no more data");
         assert_eq!(std::fs::read(&path).expect("read"), b"old");
         assert_eq!(entries(folder.path()), 1);
+    }
+
+    #[test]
+    fn a_file_written_piece_by_piece_appears_when_it_is_committed_and_not_before() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.csv");
+        let mut file = AtomicFile::begin(&path).expect("begun");
+        for _ in 0..3 {
+            file.append(&[7; 50_000]).expect("written");
+        }
+        assert!(!path.exists());
+        file.commit().expect("committed");
+        assert_eq!(std::fs::read(&path).expect("read"), [7; 150_000]);
+        AtomicFile::begin(&path).expect("begun").append(b"half").expect("written");
+        assert_eq!((entries(folder.path()), path.metadata().expect("a file").len()), (1, 150_000));
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! Scene      ─► phantom    ─► obj
 //! AuditReport ─► audit     ─► page: html · csv
 //! CurveReport, ScaleReport ─► bench ─► page: html · svg, csv
+//! Study, DoseReport ─► dose ─► csv, json lines
 //! any record ─► json
 //!                  └─► atomic: temporary file beside the target ─► flush ─► sync ─► rename
 //! ```
@@ -12,6 +13,7 @@
 pub mod atomic;
 pub mod audit;
 pub mod bench;
+pub mod dose;
 pub mod image;
 pub mod json;
 pub mod metaimage;
@@ -23,5 +25,5 @@ pub mod png;
 pub mod projection;
 pub mod sidecar;
 
-pub use atomic::{create_folder, write_atomically};
+pub use atomic::{AtomicFile, create_folder, remove_stale, write_atomically};
 pub use image::{FloatImage, Geometry, RgbImage, RgbaImage, image_of};

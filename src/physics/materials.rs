@@ -19,6 +19,23 @@ const TABLE: &str = include_str!("data/attenuation.csv");
 #[derive(Clone, Copy, Debug)]
 pub struct Material(&'static Entry);
 
+/// Electrons per unit of atomic mass, ⟨Z/A⟩, of the table's materials: NIST's material constants (NISTIR 5632, Table 2).
+const ELECTRONS_PER_AMU: [(&str, f64); 13] = [
+    ("adipose", 0.55579),
+    ("air", 0.49919),
+    ("blood", 0.54999),
+    ("bone_cortical", 0.51478),
+    ("brain", 0.55239),
+    ("breast", 0.55196),
+    ("lung", 0.55048),
+    ("lung_inflated", 0.55048),
+    ("muscle", 0.55000),
+    ("pmma", 0.53937),
+    ("soft_tissue", 0.54996),
+    ("soft_tissue_4comp", 0.54975),
+    ("water", 0.55508),
+];
+
 #[derive(Debug)]
 struct Entry {
     name: String,
@@ -67,6 +84,12 @@ impl Material {
     /// The usual density, g/cm³; 0 for vacuum.
     pub fn density_g_cm3(self) -> f64 {
         self.0.density_g_cm3
+    }
+
+    /// Electrons per unit of atomic mass, ⟨Z/A⟩; 0 for vacuum. Times the density it is the electron density, in moles/cm³.
+    pub fn electrons_per_amu(self) -> f64 {
+        let known = ELECTRONS_PER_AMU.iter().find(|(name, _)| *name == self.name());
+        known.map_or(0.0, |(_, electrons)| *electrons)
     }
 
     /// Whether the material attenuates nothing at any density.
@@ -150,6 +173,50 @@ mod tests {
 
     fn table() -> impl Iterator<Item = Material> {
         Material::names().map(material).filter(|material| !material.is_vacuum())
+    }
+
+    #[test]
+    fn electrons_per_mass_follow_from_the_elements() {
+        /// Z and relative atomic mass (IUPAC 2021).
+        const ELEMENTS: [(&str, f64, f64); 12] = [
+            ("H", 1.0, 1.008),
+            ("C", 6.0, 12.011),
+            ("N", 7.0, 14.007),
+            ("O", 8.0, 15.999),
+            ("Na", 11.0, 22.990),
+            ("Mg", 12.0, 24.305),
+            ("P", 15.0, 30.974),
+            ("S", 16.0, 32.06),
+            ("Cl", 17.0, 35.45),
+            ("Ar", 18.0, 39.95),
+            ("K", 19.0, 39.098),
+            ("Ca", 20.0, 40.078),
+        ];
+        // Percent by weight, ICRU Report 44; compounds from their formulas.
+        let compositions = [
+            ("water", "H 11.190 O 88.810"),
+            ("pmma", "H 8.054 C 59.985 O 31.961"),
+            ("air", "C 0.012 N 75.527 O 23.178 Ar 1.283"),
+            ("adipose", "H 11.4 C 59.8 N 0.7 O 27.8 Na 0.1 S 0.1 Cl 0.1"),
+            ("bone_cortical", "H 3.4 C 15.5 N 4.2 O 43.5 Na 0.1 Mg 0.2 P 10.3 S 0.3 Ca 22.5"),
+            ("brain", "H 10.7 C 14.5 N 2.2 O 71.2 Na 0.2 P 0.4 S 0.2 Cl 0.3 K 0.3"),
+            ("breast", "H 10.6 C 33.2 N 3.0 O 52.7 Na 0.1 P 0.1 S 0.2 Cl 0.1"),
+            ("lung", "H 10.3 C 10.5 N 3.1 O 74.9 Na 0.2 P 0.2 S 0.3 Cl 0.3 K 0.2"),
+            ("muscle", "H 10.2 C 14.3 N 3.4 O 71.0 Na 0.1 P 0.2 S 0.3 Cl 0.1 K 0.4"),
+            ("soft_tissue", "H 10.2 C 14.3 N 3.4 O 70.8 Na 0.2 P 0.3 S 0.3 Cl 0.2 K 0.3"),
+            ("soft_tissue_4comp", "H 10.117 C 11.1 N 2.6 O 76.183"),
+        ];
+        for (name, composition) in compositions {
+            let words: Vec<&str> = composition.split(' ').collect();
+            let share = |pair: &[&str]| {
+                let element = ELEMENTS.iter().find(|e| e.0 == pair[0]).expect("an element");
+                pair[1].parse::<f64>().expect("a number") / 100.0 * element.1 / element.2
+            };
+            let electrons: f64 = words.chunks(2).map(share).sum();
+            let listed = material(name).electrons_per_amu();
+            assert!((electrons - listed).abs() < 3e-5, "{name}: {electrons}, listed {listed}");
+        }
+        assert!(table().all(|material| material.electrons_per_amu() > 0.4));
     }
 
     #[test]

@@ -23,15 +23,15 @@ const DEFAULT_COLOUR: &str = "#808080";
 /// See [`DEFAULT_COLOUR`].
 const DEFAULT_OPACITY: f64 = 0.5;
 /// Forty times the densest matter on Earth. Beyond some 1e300, attenuation would overflow.
-const MAX_DENSITY_G_CM3: f64 = 1000.0;
+pub(crate) const MAX_DENSITY_G_CM3: f64 = 1000.0;
 /// A scene file longer than 16 MiB is no scene file.
-const SCENE_FILE: regular_file::Kind = regular_file::Kind {
+pub(crate) const SCENE_FILE: regular_file::Kind = regular_file::Kind {
     name: "scene file",
     max_bytes: 16 << 20,
     if_too_large: "give a scene file in TOML; surfaces belong in mesh files beside it",
 };
 /// A megabyte holds some fifty thousand bins: one for each eV that tables resolve.
-const SPECTRUM_FILE: regular_file::Kind = regular_file::Kind {
+pub(crate) const SPECTRUM_FILE: regular_file::Kind = regular_file::Kind {
     name: "spectrum file",
     max_bytes: 1 << 20,
     if_too_large: "give a table of energy_keV,weight with fewer bins",
@@ -205,25 +205,31 @@ fn appearance(spec: &OrganSpec) -> Result<Appearance, (&'static str, Error)> {
 }
 
 fn spectrum(spec: &SpectrumSpec, text: &SceneText, folder: &Folder) -> Result<Spectrum> {
-    let at = |key: &str, error: Error| {
+    spec.spectrum(folder).map_err(|(key, error)| {
         let (message, remedy) = error.into_words();
         text.error(&[Step::Key("spectrum"), Step::Key(key)], format!("spectrum: {message}"), "here", remedy)
-    };
-    let source = match (spec.energy_kev, spec.kvp, &spec.file) {
-        (Some(energy), None, None) => Spectrum::mono(energy).map_err(|e| at("energy_keV", e))?,
-        (None, Some(kvp), None) => Spectrum::tungsten(kvp).map_err(|e| at("kvp", e))?,
-        (None, None, Some(file)) => read_spectrum(file, folder).map_err(|e| at("file", e))?,
-        (None, None, None) => Spectrum::mono(DEFAULT_ENERGY_KEV)?,
-        _ => {
-            let error = Error::input(
-                "spectrum",
-                "it has several sources",
-                "give one of `energy_keV`, `kvp` or `file`",
-            );
-            return Err(at("kvp", error));
-        }
-    };
-    source.filtered(&spec.filters).map_err(|e| at("filters", e))
+    })
+}
+
+impl SpectrumSpec {
+    /// The photons behind the filters, with files from `folder`; or what is wrong, and with which key.
+    pub(crate) fn spectrum(&self, folder: &Folder) -> Result<Spectrum, (&'static str, Error)> {
+        let source = match (self.energy_kev, self.kvp, &self.file) {
+            (Some(energy), None, None) => Spectrum::mono(energy).map_err(|e| ("energy_keV", e))?,
+            (None, Some(kvp), None) => Spectrum::tungsten(kvp).map_err(|e| ("kvp", e))?,
+            (None, None, Some(file)) => read_spectrum(file, folder).map_err(|e| ("file", e))?,
+            (None, None, None) => Spectrum::mono(DEFAULT_ENERGY_KEV).map_err(|e| ("energy_keV", e))?,
+            _ => {
+                let error = Error::input(
+                    "spectrum",
+                    "it has several sources",
+                    "give one of `energy_keV`, `kvp` or `file`",
+                );
+                return Err(("kvp", error));
+            }
+        };
+        source.filtered(&self.filters).map_err(|e| ("filters", e))
+    }
 }
 
 fn read_spectrum(file: &str, folder: &Folder) -> Result<Spectrum> {

@@ -7,7 +7,7 @@
 
 pub mod beam;
 pub mod body;
-mod build;
+pub(crate) mod build;
 mod folder;
 mod frustum;
 pub mod iec;
@@ -19,12 +19,12 @@ mod nesting;
 pub mod organ;
 pub mod panel;
 pub mod phantoms;
-mod problem;
+pub(crate) mod problem;
 pub mod ranges;
-mod regular_file;
-mod schema;
+pub(crate) mod regular_file;
+pub(crate) mod schema;
 pub mod shape;
-mod text;
+pub(crate) mod text;
 mod view;
 
 use crate::error::Result;

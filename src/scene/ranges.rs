@@ -57,7 +57,7 @@ impl FromStr for Angles {
         let mut degrees = Vec::new();
         for item in text.split(',') {
             match item.split_once("..") {
-                Some((start, rest)) => degrees.extend(range(item.trim(), start, rest)?),
+                Some(_) => degrees.extend(range(item, true)?),
                 None => degrees.push(number(item)?),
             }
         }
@@ -65,14 +65,17 @@ impl FromStr for Angles {
     }
 }
 
-/// The angles of `start..end:step`; `item` is the whole text, for the error.
-fn range(item: &str, start: &str, rest: &str) -> Result<Vec<f64>, String> {
+/// The numbers of `start..end:step`. The end is included when it falls on a step; not if `turns` and the range spans whole
+/// turns of 360.
+pub(crate) fn range(item: &str, turns: bool) -> Result<Vec<f64>, String> {
+    let item = item.trim();
+    let (start, rest) = item.split_once("..").unwrap_or((item, ""));
     let (end, step) = rest.split_once(':').ok_or_else(|| {
         format!("the range {item:?} has no step; write start..end:step, for example 0..360:30")
     })?;
     let (start, end, step) = (number(start)?, number(end)?, number(step)?);
     if step == 0.0 {
-        return Err(format!("the range {item:?} has a step of zero; give the angle between views"));
+        return Err(format!("the range {item:?} has a step of zero; give the distance from one to the next"));
     }
     let steps = (end - start) / step;
     if steps < 0.0 {
@@ -80,8 +83,8 @@ fn range(item: &str, start: &str, rest: &str) -> Result<Vec<f64>, String> {
     }
     let whole_steps = (steps + ON_STEP).floor();
     let ends_on_step = (steps - whole_steps).abs() <= ON_STEP;
-    let turns = (end - start) / 360.0;
-    let full_turn = turns != 0.0 && (turns - turns.round()).abs() <= ON_STEP && turns.round() != 0.0;
+    let turned = (end - start) / 360.0;
+    let full_turn = turns && (turned - turned.round()).abs() <= ON_STEP && turned.round() != 0.0;
     let count = if full_turn && ends_on_step { whole_steps } else { whole_steps + 1.0 };
     // Finite but huge ends can make the count infinite or NaN.
     if count.is_nan() || count > MAX_VIEWS as f64 {
@@ -94,12 +97,12 @@ fn number(text: &str) -> Result<f64, String> {
     let text = text.trim();
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
-        _ => Err(format!("{text:?} is not an angle; write degrees, for example 90, 0,90,180 or 0..360:30")),
+        _ => Err(format!("{text:?} is not a number; write, for example, 90, 0,90,180 or 0..360:30")),
     }
 }
 
 fn too_many(count: f64) -> String {
-    format!("{count} angles are more than the {MAX_VIEWS} that one beam may have; use a coarser step")
+    format!("{count} values are more than the {MAX_VIEWS} that one list may have; use a coarser step")
 }
 
 impl<'de> Deserialize<'de> for Angles {
@@ -175,10 +178,10 @@ mod tests {
     #[test]
     fn bad_texts_are_refused_with_a_remedy() {
         for (text, word) in [
-            ("", "is not an angle"),
-            ("0,,90", "is not an angle"),
-            ("nan", "is not an angle"),
-            ("1e999", "is not an angle"),
+            ("", "is not a number"),
+            ("0,,90", "is not a number"),
+            ("nan", "is not a number"),
+            ("1e999", "is not a number"),
             ("0..360", "no step"),
             ("0..360:0", "zero"),
             ("0..90:-10", "sign"),

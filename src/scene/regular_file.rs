@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 
 /// What a file is to be read as, for its limit and for messages.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Kind {
+pub(crate) struct Kind {
     /// In the singular, without article: `mesh file`.
     pub name: &'static str,
     /// The most that is read, bytes.
@@ -21,7 +21,7 @@ pub(super) struct Kind {
 ///
 /// # Errors
 /// What the file system says; named pipes, devices and folders, which may have no end; files larger than the kind's limit.
-pub(super) fn read(path: &Path, kind: Kind) -> Result<Vec<u8>> {
+pub(crate) fn read(path: &Path, kind: Kind) -> Result<Vec<u8>> {
     let refused = |source| Error::io("read", path, source);
     // Asked before opening: opening a named pipe would wait for its other end.
     let about = std::fs::metadata(path).map_err(refused)?;
@@ -54,7 +54,7 @@ pub(super) fn read(path: &Path, kind: Kind) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// As [`read`]; bytes that are not UTF-8.
-pub(super) fn read_text(path: &Path, kind: Kind) -> Result<String> {
+pub(crate) fn read_text(path: &Path, kind: Kind) -> Result<String> {
     String::from_utf8(read(path, kind)?).map_err(|wrong| {
         Error::input(
             path.display().to_string(),

@@ -35,6 +35,11 @@ impl SceneText {
         &self.name
     }
 
+    /// The document.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
     /// The document as typed values.
     ///
     /// # Errors

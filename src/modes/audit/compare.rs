@@ -224,7 +224,8 @@ impl AtWork<'_> {
             None => {
                 let bounds = body.bounds();
                 let rays = batch.rays.iter().enumerate();
-                rays.filter(|(_, ray)| comes_near(ray, &bounds)).map(|(i, ray)| (i, *ray)).unzip()
+                // Takes in what a shape has beyond its inscribed mesh only in part: such rays miss mesh and organ.
+                rays.filter(|(_, ray)| bounds.ball_meets(ray.line())).map(|(i, ray)| (i, *ray)).unzip()
             }
         };
         if rays.is_empty() {
@@ -342,12 +343,4 @@ fn zone(length_mm: f64, ray: &Segment, bounds: &Bounds) -> Zone {
 fn true_length(shape: &Shape, ray: &Segment) -> f64 {
     let chord = shape.chord(ray.line()).and_then(|chord| chord.intersection(&ray.reach()));
     chord.map_or(0.0, |chord| chord.length())
-}
-
-/// Whether the ray's line may meet the box: it passes the ball around it at less than its radius. A millionth more is far
-/// above rounding, and takes in what a shape has beyond its inscribed mesh only in part: such rays miss mesh and organ.
-fn comes_near(ray: &Segment, bounds: &Bounds) -> bool {
-    let to_centre = bounds.centre() - ray.line().origin();
-    let reach = 0.5 * bounds.diagonal() * (1.0 + 1e-6);
-    to_centre.cross(ray.line().dir()).length_squared() <= reach * reach
 }

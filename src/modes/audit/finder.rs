@@ -137,25 +137,10 @@ fn ask_tree(forest: &Forest, organ: usize, body: &Body, rays: &[Segment], answer
     answers.resize(rays.len(), Answer::default());
     let grove = forest.enter();
     let Some(tree) = grove.tree(organ) else { return };
-    let bounds = body.bounds();
-    let (mut open, mut open_rays) = (Vec::new(), Vec::new());
-    for (i, ray) in rays.iter().enumerate() {
-        let known = if holds_box(ray, &bounds) { grove.chord(tree, ray).ok() } else { None };
-        match known {
-            Some(chord) => {
-                let length_mm = chord.map_or(0.0, |chord| chord.length());
-                answers[i] = Answer { length_mm, found: Found::Interpolated };
-            }
-            None => {
-                open.push(i);
-                open_rays.push(*ray);
-                answers[i].found = Found::Traced;
-            }
-        }
-    }
-    let mut spans = Spans::default();
-    body.trace(body.engine_for_rays(), 0, &open_rays, &mut spans);
-    spans.drain(|at, part| answers[open[at]].length_mm += part.length());
+    grove.chords(tree, body, rays, &mut Spans::default(), |ray, found, part| {
+        answers[ray].found = found;
+        answers[ray].length_mm += part.map_or(0.0, |part| part.length());
+    });
 }
 
 /// The reference: clipping for convex bodies, the hierarchy of boxes for all others; each ray by itself.

@@ -159,6 +159,7 @@ impl<'a> Audit<'a> {
         match &self.settings.rays {
             RaySet::Views(views) => views.iter().map(View::pixels).sum(),
             RaySet::Random { rays, .. } => *rays,
+            RaySet::Sample { lines, .. } => lines.len() as u64,
             RaySet::Adversarial { rays, .. } => rays * (Aim::ALL.len() * self.scene.organs.len()) as u64,
         }
     }
@@ -275,7 +276,7 @@ impl<'a> Audit<'a> {
 
     /// Whether the rays are a random sample of all lines.
     fn is_sampled(&self) -> bool {
-        matches!(self.settings.rays, RaySet::Random { .. })
+        matches!(self.settings.rays, RaySet::Random { .. } | RaySet::Sample { .. })
     }
 
     /// Where the audit's ray of an origin starts, and its way, mm.
@@ -315,6 +316,7 @@ fn check(settings: &AuditSettings) -> Result<()> {
     }
     let rays = match &settings.rays {
         RaySet::Views(views) => views.len() as u64,
+        RaySet::Sample { lines, .. } => lines.len() as u64,
         RaySet::Random { rays, .. } | RaySet::Adversarial { rays, .. } => *rays,
     };
     if rays == 0 {

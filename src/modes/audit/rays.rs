@@ -39,6 +39,15 @@ pub enum RaySet {
         /// Of the random numbers.
         seed: u64,
     },
+    /// These lines, a random sample of a study's.
+    Sample {
+        /// Where each starts, and the way to its end, mm.
+        lines: Vec<(DVec3, DVec3)>,
+        /// Of what they are a sample, in words.
+        of: String,
+        /// Of the random numbers that chose them.
+        seed: u64,
+    },
 }
 
 /// What an adversarial line is aimed at.
@@ -103,25 +112,29 @@ pub(super) struct Lines<'a> {
     rays: u64,
     seed: u64,
     aims: &'static [Aim],
+    /// Lines that need not be made.
+    given: &'a [Shot],
 }
 
 impl<'a> Lines<'a> {
     /// `None` if the set is one of views.
-    pub fn of(set: &RaySet, bodies: Vec<&'a Body>) -> Option<Self> {
-        let (rays, seed, aims): (_, _, &[Aim]) = match *set {
+    pub fn of(set: &'a RaySet, bodies: Vec<&'a Body>) -> Option<Self> {
+        let (rays, seed, aims, given): (_, _, &[Aim], &[Shot]) = match set {
             RaySet::Views(_) => return None,
-            RaySet::Random { rays, seed } => (rays, seed, &[]),
-            RaySet::Adversarial { rays, seed } => (rays, seed, &Aim::ALL),
+            RaySet::Random { rays, seed } => (*rays, *seed, &[], &[]),
+            RaySet::Adversarial { rays, seed } => (*rays, *seed, &Aim::ALL, &[]),
+            RaySet::Sample { lines, seed, .. } => (lines.len() as u64, *seed, &[], lines),
         };
         let ball = Ball::around(bodies.iter().fold(Bounds::EMPTY, |all, body| all.union(body.bounds())));
-        Some(Self { bodies, ball, rays, seed, aims })
+        Some(Self { bodies, ball, rays, seed, aims, given })
     }
 
     /// The set's parts, with their blocks.
     pub fn sections(&self) -> Vec<(&'static str, Range<u64>)> {
         let blocks = self.rays.div_ceil(BLOCK);
         if self.aims.is_empty() {
-            return vec![("random lines", 0..blocks)];
+            let name = if self.given.is_empty() { "random lines" } else { "a sample of lines" };
+            return vec![(name, 0..blocks)];
         }
         let of_aim = blocks * self.bodies.len() as u64;
         (0..).zip(self.aims).map(|(i, aim)| (aim.name(), i * of_aim..(i + 1) * of_aim)).collect()
@@ -129,6 +142,9 @@ impl<'a> Lines<'a> {
 
     /// The lines of a block.
     pub fn block(&self, block: u64) -> Vec<Shot> {
+        if !self.given.is_empty() {
+            return self.given.chunks(BLOCK as usize).nth(block as usize).unwrap_or_default().to_vec();
+        }
         let (blocks, organs) = (self.rays.div_ceil(BLOCK).max(1), self.bodies.len() as u64);
         let count = BLOCK.min(self.rays - block % blocks * BLOCK);
         let mut archer = Archer { rng: block_rng(self.seed, block) };
@@ -254,7 +270,8 @@ mod tests {
         // chord over them is 4V/S (Cauchy–Crofton).
         let rays = 10 * BLOCK;
         let [body, far] = [0.0, 2.0].map(|x| ball_at(DVec3::new(x, 0.0, 0.0)));
-        let lines = Lines::of(&RaySet::Random { rays, seed: 5 }, vec![&body, &far]).expect("lines");
+        let set = RaySet::Random { rays, seed: 5 };
+        let lines = Lines::of(&set, vec![&body, &far]).expect("lines");
         let ball = lines.ball;
         let (mut hits, mut total) = (0.0, 0.0);
         for (source, path) in (0..10).flat_map(|block| lines.block(block)) {
@@ -276,7 +293,8 @@ mod tests {
     #[test]
     fn aimed_lines_hold_the_whole_scene_between_their_ends() {
         let [body, far] = [0.0, -4.0].map(|x| ball_at(DVec3::new(x, 0.0, 0.0)));
-        let lines = Lines::of(&RaySet::Adversarial { rays: 100, seed: 7 }, vec![&body, &far]).expect("lines");
+        let set = RaySet::Adversarial { rays: 100, seed: 7 };
+        let lines = Lines::of(&set, vec![&body, &far]).expect("lines");
         let sections = lines.sections();
         assert_eq!(sections.len(), Aim::ALL.len());
         for (name, blocks) in sections {

@@ -210,6 +210,7 @@ impl RayWords {
             RaySet::Random { seed, .. } => {
                 ("uniform, isotropic random lines through the ball around the scene".into(), Some(*seed))
             }
+            RaySet::Sample { of, seed, .. } => (format!("a random sample of {of}"), Some(*seed)),
             RaySet::Adversarial { rays, seed } => {
                 (format!("{rays} adversarial lines for each organ and aim"), Some(*seed))
             }

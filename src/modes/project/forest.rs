@@ -6,8 +6,9 @@ use std::sync::{OnceLock, PoisonError, RwLock, RwLockReadGuard};
 use serde::Serialize;
 
 use crate::attributes::chord::ChordLength;
-use crate::exact::Body;
+use crate::exact::{Body, Spans};
 use crate::geometry::{Interval, Segment};
+use crate::modes::project::Found;
 use crate::ritree::{Answer, BuildCounts, Cache, Parameters, Reason, RiTree, TreeShape, oldest_to_keep};
 
 /// How RI-trees are grown; the defaults are the paper's.
@@ -206,6 +207,32 @@ impl<'a> Grove<'_, 'a> {
             Some(Answer::Interpolated(Some(chord))) => Ok(attribute.stretch(chord, line, point)),
             Some(Answer::Trace(reason)) => Err(reason),
         }
+    }
+
+    /// The parts of rays in a body that is in `tree`: as the tree knows them, or traced. `answer` is told each ray's place and
+    /// how it is answered, with its part if the tree knows one; parts that are traced follow. `spans` comes and goes empty.
+    pub fn chords(
+        &self,
+        tree: &RiTree<ChordLength>,
+        body: &Body,
+        rays: &[Segment],
+        spans: &mut Spans,
+        mut answer: impl FnMut(usize, Found, Option<Interval>),
+    ) {
+        let bounds = body.bounds();
+        let (mut open, mut open_rays) = (Vec::new(), Vec::new());
+        for (i, ray) in rays.iter().enumerate() {
+            match holds_box(ray, &bounds).then(|| self.chord(tree, ray)) {
+                Some(Ok(chord)) => answer(i, Found::Interpolated, chord),
+                Some(Err(_)) | None => {
+                    answer(i, Found::Traced, None);
+                    open.push(i);
+                    open_rays.push(*ray);
+                }
+            }
+        }
+        body.trace(body.engine_for_rays(), 0, &open_rays, spans);
+        spans.drain(|at, part| answer(open[at], Found::Traced, Some(part)));
     }
 
     /// The depth of the cell that answers a line. `None` if the line passes the body's box by.

@@ -91,7 +91,7 @@ fn numbers(f: &Figures) -> String {
 }
 
 /// A text as one field, in quotes where it must be.
-fn field(text: &str) -> String {
+pub fn field(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", text.replace('"', "\"\""))
     } else {

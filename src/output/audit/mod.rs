@@ -9,15 +9,15 @@
 //! | `histogram.csv` | errors by magnitude |
 //! | `worst.csv` | the worst rays, with what finds each again |
 
-mod csv;
+pub(super) mod csv;
 mod definitions;
 mod page;
 mod panels;
 
 use std::path::Path;
 
-use super::{create_folder, json, write_atomically};
-use crate::error::{Error, Result};
+use super::{create_folder, json, remove_stale, write_atomically};
+use crate::error::Result;
 use crate::modes::audit::{AuditReport, Pictures};
 
 /// The page's name.
@@ -33,10 +33,7 @@ pub const RECORD: &str = "audit.json";
 pub fn write(folder: &Path, report: &AuditReport, pictures: Option<&Pictures>) -> Result<()> {
     create_folder(folder)?;
     let record = folder.join(RECORD);
-    match std::fs::remove_file(&record) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Error::io("replace", &record, e)),
-        _ => {}
-    }
+    remove_stale(&record)?;
     let panels = pictures.map(|pictures| panels::panels(pictures, report.tolerance_mm)).transpose()?;
     for (name, text) in [
         (PAGE, page::page(report, panels.as_deref().unwrap_or_default())),
