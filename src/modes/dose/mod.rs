@@ -29,6 +29,7 @@ mod depth;
 mod lengths;
 mod optics;
 mod part;
+mod picture;
 mod report;
 mod sums;
 
@@ -55,6 +56,7 @@ use sums::{Node, Nodes};
 pub use block::{Block, OrganRow, PathRow};
 pub use depth::DepthPoint;
 pub use part::{Part, Piece, Shard, join};
+pub use picture::{DepthCurve, FieldPicture, Illustrations};
 pub use report::{
     BeamFigures, CaseFigures, DoseReport, FieldFigures, LengthBar, NOTICE, OrganErrors, OrganFigures,
     SampledErrors, StudyWords,
