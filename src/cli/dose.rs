@@ -38,7 +38,7 @@ pub fn run(args: &DoseArgs, session: &Session, out: &mut dyn Write) -> Result<()
         Some(shard) => run_part(&dose, shard, method, args, session, out),
         None if args.join => {
             let report = join(&study, method, args, session)?;
-            finish(report, args, out)
+            finish(&dose, report, args, session, out)
         }
         None => {
             session.begin_writing();
@@ -47,7 +47,7 @@ pub fn run(args: &DoseArgs, session: &Session, out: &mut dyn Write) -> Result<()
             let report = follow(&dose, Shard::WHOLE, &args.output, args, session, |keeper, control| {
                 keeper.run(&dose, control)
             })?;
-            finish(report, args, out)
+            finish(&dose, report, args, session, out)
         }
     }
 }
@@ -154,9 +154,16 @@ fn join(study: &Study, method: Method, args: &DoseArgs, session: &Session) -> Re
     Ok(report)
 }
 
-fn finish(mut report: DoseReport, args: &DoseArgs, out: &mut dyn Write) -> Result<()> {
+fn finish(
+    dose: &Dose,
+    mut report: DoseReport,
+    args: &DoseArgs,
+    session: &Session,
+    out: &mut dyn Write,
+) -> Result<()> {
     report.command = command_line();
-    output::write(&args.output, &report, &formats(args))?;
+    let shown = dose.illustrations(&Control::new(session.cancel(), &|_| {}))?;
+    output::write(&args.output, &report, &shown, &formats(args))?;
     print(out, &if args.json { json::text(&report)? } else { summary(&report, &args.output) })
 }
 
@@ -239,7 +246,7 @@ fn summary(report: &DoseReport, folder: &Path) -> String {
             short(sample.length_mm.max)
         );
     }
-    let _ = writeln!(text, "tables and record: {}", folder.join(output::RECORD).display());
+    let _ = writeln!(text, "report: {}; tables and record beside it", folder.join(output::PAGE).display());
     text
 }
 

@@ -30,6 +30,7 @@ mod lengths;
 mod optics;
 mod part;
 mod pass;
+mod picture;
 mod report;
 mod sums;
 
@@ -56,6 +57,7 @@ use sums::{Node, Nodes};
 pub use block::{Block, OrganRow, PathRow};
 pub use depth::DepthPoint;
 pub use part::{Part, Piece, Shard, join};
+pub use picture::{DepthCurve, FieldPicture, Illustrations};
 pub use report::{
     BeamFigures, CaseFigures, DoseReport, FieldFigures, LengthBar, NOTICE, OrganErrors, OrganFigures,
     SampledErrors, StudyWords,

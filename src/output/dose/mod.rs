@@ -9,12 +9,14 @@
 //! | `case_organs.csv`, `field_organs.csv` | a row for each of them and organ |
 //! | `histograms.csv` | length-area and length-volume histograms of each of them and organ |
 //! | `errors.csv` | errors against exact lengths on a sample of the paths |
+//! | `dose.html` | the report to look at: one file, no network, no script |
 //! | `dose.json` | all but the paths, with the study's hash, parameters and version; written last |
 //!
 //! Lengths are mm, energies keV, angles degrees; units stand in the heads. Tables can be had as JSON lines, too. A part of a study
 //! (`shard-03-of-16/`) has the tables of its paths, and `sums.json`.
 
 mod figures;
+mod page;
 mod paths;
 mod rows;
 
@@ -26,25 +28,30 @@ pub use rows::Format;
 
 use super::{AtomicFile, json, write_atomically};
 use crate::error::{Error, Result};
-use crate::modes::dose::{DoseReport, Part, Shard};
+use crate::modes::dose::{DoseReport, Illustrations, Part, Shard};
 
 /// The record's name.
 pub const RECORD: &str = "dose.json";
 
+/// The page's name.
+pub const PAGE: &str = "dose.html";
+
 /// The name of a part's record.
 pub const SUMS: &str = "sums.json";
 
-/// Writes the tables of fields and cases, and the record.
+/// Writes the tables of fields and cases, the page, and the record.
 ///
 /// # Errors
 /// The first file that cannot be written. Files are whole or absent.
-pub fn write(folder: &Path, report: &DoseReport, formats: &[Format]) -> Result<()> {
+pub fn write(folder: &Path, report: &DoseReport, shown: &Illustrations, formats: &[Format]) -> Result<()> {
     for &format in formats {
         for (stem, text) in figures::tables(report, format) {
             let path = folder.join(format!("{stem}.{}", format.ending()));
             write_atomically(&path, |out| out.write_all(text.as_bytes()))?;
         }
     }
+    let page = page::page(report, shown)?;
+    write_atomically(&folder.join(PAGE), |out| out.write_all(page.as_bytes()))?;
     json::write(&folder.join(RECORD), report)?;
     Ok(())
 }

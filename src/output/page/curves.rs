@@ -14,6 +14,9 @@ const BOTTOM: f64 = 48.0;
 /// Names on an axis at most, about.
 const MOST_TICKS: f64 = 7.0;
 
+/// Points of a curve that are marked at most.
+const MOST_MARKS: usize = 60;
+
 /// What a picture that stands alone needs of the page's style.
 const STYLE: &str = "svg{background:#fff;font:11px sans-serif}.grid{stroke:#e3e3e3}text{fill:#444}.up{text-anchor:end}\
                      .at{text-anchor:middle}";
@@ -192,7 +195,9 @@ fn draw(curve: &Curve, points: &[Point], x: &Scale, y: &Scale, svg: &mut String)
         curve.colour,
         path.join(" ")
     );
-    for point in points {
+    // Where points are dense, the line shows them.
+    let marked = if points.len() > MOST_MARKS { &[] } else { points };
+    for point in marked {
         let _ = write!(
             svg,
             "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"3.2\" fill=\"{}\"><title>{}: {}, {}</title></circle>",

@@ -3,6 +3,7 @@
 pub mod base64;
 pub mod curves;
 pub mod plot;
+pub mod polar;
 
 use std::fmt::Write as _;
 
