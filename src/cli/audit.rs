@@ -223,6 +223,7 @@ fn summary(report: &AuditReport, folder: Option<&Path>) -> String {
     row("  traced, silhouette", &whole.traced_silhouette_mm);
     whole.accumulation.iter().for_each(|kind| row("accumulation", &kind.length_mm));
     whole.mesh.iter().for_each(|kind| row("mesh to closed form", &kind.length_mm));
+    whole.total.iter().for_each(|kind| row("method to closed form", &kind.length_mm));
     row("change of transmission", &report.transmission);
     if report.decided_by_rounding > 0 {
         let count = report.decided_by_rounding;
