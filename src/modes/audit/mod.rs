@@ -51,6 +51,7 @@ use worst::Origin;
 
 pub use compare::SILHOUETTE_SHARE;
 pub use picture::Pictures;
+pub(super) use rays::Archer;
 pub use rays::{Aim, RaySet};
 pub use reference::ReferenceError;
 pub use report::{AuditReport, Bar, DistanceFigures, KindFigures, OrganFigures, RayWords, SectionFigures};
