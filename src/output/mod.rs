@@ -3,7 +3,7 @@
 //! ```text
 //! Projection ─► projection ─► png (to look at) │ metaimage, npy (to compute with)
 //! Scene      ─► phantom    ─► obj
-//! AuditReport ─► audit     ─► html, csv
+//! AuditReport ─► audit     ─► page: html · csv
 //! any record ─► json
 //!                  └─► atomic: temporary file beside the target ─► flush ─► sync ─► rename
 //! ```
@@ -15,6 +15,7 @@ pub mod json;
 pub mod metaimage;
 pub mod npy;
 pub mod obj;
+pub mod page;
 pub mod phantom;
 pub mod png;
 pub mod projection;
