@@ -1,12 +1,10 @@
 //! What rounding may make of a length, and what it may not.
 
-use glam::DVec3;
-
 use crate::exact::judge::length_in_parallel_body;
-use crate::exact::rational::of_triangles;
+use crate::exact::rational::{RationalChord, of_triangles};
 use crate::exact::{Body, Engine};
-use crate::geometry::Segment;
 use crate::geometry::numeric::gamma;
+use crate::geometry::{ConvexMesh, Segment};
 
 /// How far rounding moves planes or vertices by an engine's promise, over their distance from the source; twice that, as the
 /// judge's own planes are rounded too.
@@ -28,32 +26,67 @@ fn shift_mm(body: &Body, engine: Engine, ray: &Segment) -> f64 {
     promised(engine) * distance + gamma(8) * bounds.diagonal() + between
 }
 
-/// The least and the greatest length that rounding explains, mm. `exact_mm` is the one without any.
-pub(super) fn explained(body: &Body, engine: Engine, ray: &Segment, exact_mm: Option<f64>) -> [f64; 2] {
-    let shift = shift_mm(body, engine, ray);
-    match body.convexity() {
-        Ok(convex) => {
-            let [least, most] = [-shift, shift].map(|s| length_in_parallel_body(convex, ray, s));
-            [least - shift, most + shift]
+/// What lengths of some rays rounding explains.
+pub(super) struct Explained<'a> {
+    body: &'a Body,
+    rays: &'a [Segment],
+    /// By the engines for single rays, whose promises are one; of convex bodies only.
+    in_parallel_bodies: Vec<[f64; 2]>,
+}
+
+impl<'a> Explained<'a> {
+    pub fn new(body: &'a Body, rays: &'a [Segment]) -> Self {
+        let of_ray = |ray: &Segment| {
+            let convex = body.convexity().ok()?;
+            Some(between_parallel_bodies(convex, ray, shift_mm(body, Engine::Bvh, ray)))
+        };
+        Self { body, rays, in_parallel_bodies: rays.iter().filter_map(of_ray).collect() }
+    }
+
+    /// The least and the greatest length of a ray that rounding explains, mm, by an engine that says `length_mm`. `exact` is the
+    /// one without rounding, found if not given.
+    pub fn by_rounding(
+        &self,
+        engine: Engine,
+        ray: usize,
+        length_mm: f64,
+        exact: Option<&RationalChord>,
+    ) -> [f64; 2] {
+        let (body, at) = (self.body, &self.rays[ray]);
+        let shift = shift_mm(body, engine, at);
+        match body.convexity() {
+            Ok(convex) if engine == Engine::Raster => between_parallel_bodies(convex, at, shift),
+            Ok(_) => self.in_parallel_bodies[ray],
+            Err(_) => {
+                let exact_mm = exact.map_or_else(|| exact_length(body, at), RationalChord::length_mm);
+                // Where there is nothing to explain, nothing is looked for.
+                let is_near = (length_mm - exact_mm).abs() <= 2.0 * shift;
+                let by_itself = [exact_mm - 2.0 * shift, exact_mm + 2.0 * shift];
+                if is_near { by_itself } else { between_moved_rays(body, at, shift, exact_mm) }
+            }
         }
-        Err(_) => explained_by_moved_rays(body, ray, shift, exact_mm.unwrap_or_else(|| exact(body, ray))),
     }
 }
 
-fn exact(body: &Body, ray: &Segment) -> f64 {
+fn between_parallel_bodies(convex: &ConvexMesh, ray: &Segment, shift: f64) -> [f64; 2] {
+    let [least, most] = [-shift, shift].map(|s| length_in_parallel_body(convex, ray, s));
+    [least - shift, most + shift]
+}
+
+fn exact_length(body: &Body, ray: &Segment) -> f64 {
     of_triangles(body.surface(), ray.line()).within(&ray.reach()).length_mm()
 }
 
 /// No body is parallel to one that is not convex: the lengths of rays near by stand for it, without rounding. Their spread is
 /// taken thrice, for ends of several parts move each by itself.
-fn explained_by_moved_rays(body: &Body, ray: &Segment, shift: f64, exact_mm: f64) -> [f64; 2] {
+fn between_moved_rays(body: &Body, ray: &Segment, shift: f64, exact_mm: f64) -> [f64; 2] {
     let [source, target] = [0.0, ray.length_mm()].map(|t| ray.line().at(t));
     let (u, v) = ray.line().dir().any_orthonormal_pair();
     let moves = [u, -u, v, -v].map(|to| 2.0 * shift * to);
     let pairs = moves.iter().flat_map(|a| moves.iter().map(move |b| (source + *a, target + *b)));
     let moved = pairs.filter_map(|(from, to)| Segment::between(from, to));
     let [least, most] = moved.fold([exact_mm; 2], |[least, most], ray| {
-        let length = exact(body, &ray);
+        let length = exact_length(body, &ray);
         [f64::min(least, length), f64::max(most, length)]
     });
     [exact_mm - 3.0 * (exact_mm - least) - 2.0 * shift, exact_mm + 3.0 * (most - exact_mm) + 2.0 * shift]
@@ -61,11 +94,16 @@ fn explained_by_moved_rays(body: &Body, ray: &Segment, shift: f64, exact_mm: f64
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::geometry::ClosedMesh;
     use crate::geometry::primitives::{cube, icosphere, inside_out};
+    use crate::modes::stability::ENGINES;
 
-    const ENGINES: [Engine; 4] = [Engine::Clip, Engine::Walk, Engine::Raster, Engine::Bvh];
+    fn explained(body: &Body, engine: Engine, ray: &Segment, length_mm: f64) -> [f64; 2] {
+        Explained::new(body, std::slice::from_ref(ray)).by_rounding(engine, 0, length_mm, None)
+    }
 
     #[test]
     fn a_steep_rays_length_is_known_to_a_few_units_of_the_distance() {
@@ -80,22 +118,32 @@ mod tests {
             body.chords_of_segment(&ray, &mut parts);
             let length: f64 = parts.iter().map(|part| part.length()).sum();
             for engine in ENGINES {
-                let [least, most] = explained(&body, engine, &ray, None);
-                assert!(least <= length && length <= most, "{engine:?}: {length}, from {least} to {most}");
-                assert!(most - least < 1e-10, "{engine:?} would be allowed {}", most - least);
+                for told in [length, length + 1e-9, 0.0] {
+                    let [least, most] = explained(&body, engine, &ray, told);
+                    assert!(
+                        least <= length && length <= most,
+                        "{engine:?}: {length}, from {least} to {most}"
+                    );
+                    assert!(most - least < 1e-10, "{engine:?} would be allowed {}", most - least);
+                }
             }
         }
     }
 
     #[test]
     fn a_tangent_may_be_hit_or_missed_within_rounding_only() {
-        let body = Body::new(ClosedMesh::new(cube(20.0)).expect("closed").0);
-        let along_the_top = |z: f64| Segment::between(DVec3::new(-90.0, 3.0, z), DVec3::new(90.0, 3.0, z));
-        let may_be = |z: f64, length: f64| {
-            let [least, most] = explained(&body, Engine::Bvh, &along_the_top(z).expect("a ray"), None);
-            least <= length && length <= most
-        };
-        assert!(may_be(10.0, 0.0) && may_be(10.0, 20.0) && !may_be(10.0, 20.1));
-        assert!(!may_be(10.0 - 1e-9, 0.0) && !may_be(10.0 + 1e-9, 20.0));
+        let mut pair = cube(20.0);
+        pair.append(&cube(2.0).map_vertices(|v| v + 50.0));
+        for mesh in [cube(20.0), pair] {
+            let body = Body::new(ClosedMesh::new(mesh).expect("closed").0);
+            let along_the_top =
+                |z: f64| Segment::between(DVec3::new(-90.0, 3.0, z), DVec3::new(90.0, 3.0, z));
+            let may_be = |z: f64, length: f64| {
+                let [least, most] = explained(&body, Engine::Bvh, &along_the_top(z).expect("a ray"), length);
+                least <= length && length <= most
+            };
+            assert!(may_be(10.0, 0.0) && may_be(10.0, 20.0) && !may_be(10.0, 90.1));
+            assert!(!may_be(10.0 - 1e-9, 0.0) && !may_be(10.0 + 1e-9, 20.0));
+        }
     }
 }

@@ -138,18 +138,16 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// Enters a length. `exact` is given for those recomputed.
+    /// Enters a length, and between which rounding explains it. `exact` is given for those recomputed.
     fn add(
         &mut self,
         body: &Body,
-        engine: Engine,
         ray: &Aimed,
         length_mm: f64,
+        [least, most]: [f64; 2],
         exact: Option<&RationalChord>,
     ) {
         self.rays += 1;
-        let exact_mm = exact.map(RationalChord::length_mm);
-        let [least, most] = judge::explained(body, engine, &ray.segment, exact_mm);
         // Also what is not a number is beyond.
         if !(least <= length_mm && length_mm <= most) {
             if self.beyond == 0 {
@@ -158,7 +156,8 @@ impl Figures {
             self.beyond += 1;
             self.lost += u64::from(least > 0.0 && length_mm == 0.0);
         }
-        let (Some(exact), Some(exact_mm)) = (exact, exact_mm) else { return };
+        let Some(exact) = exact else { return };
+        let exact_mm = exact.length_mm();
         self.recomputed += 1;
         if most - least > OPEN_SHARE * body.bounds().diagonal() {
             self.open += 1;
@@ -257,6 +256,7 @@ fn trace_block(body: &Body, rays: &[Aimed], recomputed: u64) -> [Figures; ENGINE
         (planes, of_triangles(body.surface(), segment.line()).within(&segment.reach()))
     });
     let exact: Vec<(Option<RationalChord>, RationalChord)> = exact.collect();
+    let explained = judge::Explained::new(body, &segments);
     ENGINES.map(|engine| {
         let mut figures = Figures::default();
         if !engine.serves(body) {
@@ -276,7 +276,8 @@ fn trace_block(body: &Body, rays: &[Aimed], recomputed: u64) -> [Figures; ENGINE
                 (Engine::Clip, Some(planes)) => planes,
                 _ => triangles,
             });
-            figures.add(body, engine, ray, length_mm, exact);
+            let between = explained.by_rounding(engine, i, length_mm, exact);
+            figures.add(body, ray, length_mm, between, exact);
         }
         figures
     })
