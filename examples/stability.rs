@@ -7,18 +7,20 @@ use std::io::Write;
 
 use chordfield::Error;
 use chordfield::modes::Control;
-use chordfield::modes::stability::{Case, Effort, hard_bodies, sweep, table};
+use chordfield::modes::stability::{Case, Effort, HARD_BODIES, sweep, table};
 
 fn main() -> chordfield::Result<()> {
     let refused = |problem: &str| Error::input("stability", problem, "give a number of rays, as `1e8`");
-    let bodies = hard_bodies().map_err(|fault| refused(&fault.to_string()))?;
     let mut effort = Effort::default();
     if let Some(words) = std::env::args().nth(1) {
         let rays: f64 = words.parse().map_err(|_| refused("that is no number"))?;
-        effort.rays = (rays / (bodies.len() * Case::ALL.len()) as f64).ceil() as u64;
+        effort.rays = (rays / (HARD_BODIES.len() * Case::ALL.len()) as f64).ceil() as u64;
     }
-    let found = bodies.iter().map(|hard| sweep(hard.name, &hard.body, effort, &Control::none()));
-    let found = found.collect::<chordfield::Result<Vec<_>>>()?.concat();
+    let mut found = Vec::new();
+    for hard in HARD_BODIES {
+        let body = hard.body().map_err(|fault| refused(&fault.to_string()))?;
+        found.extend(sweep(hard.name, &body, effort, &Control::none())?);
+    }
     std::io::stdout()
         .write_all(table(&found).as_bytes())
         .map_err(|e| Error::io("write", "standard output".as_ref(), e))

@@ -4,24 +4,32 @@ mod common;
 
 use std::process::Command;
 
-use chordfield::exact::Engine;
 use chordfield::exact::rational::of_planes;
+use chordfield::exact::{Body, Engine};
 use chordfield::geometry::primitives::icosphere;
 use chordfield::geometry::{ClosedMesh, ConvexMesh, Segment};
 use chordfield::modes::Control;
-use chordfield::modes::stability::{Case, ENGINES, Effort, Found, HardBody, hard_bodies, rays, sweep, table};
+use chordfield::modes::stability::{Case, ENGINES, Effort, Found, HARD_BODIES, rays, sweep, table};
 use common::nested_balls;
 use glam::DVec3;
 
-/// Made in seconds; the table in the documentation has them all.
-const MOST_FACES: usize = 100_000;
+/// Made in seconds, and left out of what is to be quick; the table in the documentation has it.
+const LARGE: &str = "ball of 327 680 faces";
 
 /// Over faces within some 10⁻⁹ of edge-on the raster's depths are the differences of huge numbers: chords that begin there are up
 /// to a micrometre or so too long, which nothing explains.
 const KNOWN: (Engine, &str) = (Engine::Raster, "faces all but coplanar");
 
-fn swept(bodies: &[HardBody], effort: Effort) -> Vec<Found> {
-    let found = bodies.iter().map(|hard| sweep(hard.name, &hard.body, effort, &Control::none()));
+fn bodies(are_all: bool) -> Vec<(&'static str, Body)> {
+    let hard = HARD_BODIES.iter().filter(|hard| are_all || hard.name != LARGE);
+    hard.map(|hard| (hard.name, hard.body().expect("closed"))).collect()
+}
+
+/// Sweeps through all bodies, with so many rays in all at least.
+fn swept(bodies: &[(&str, Body)], effort: Effort, at_least: u64) -> Vec<Found> {
+    let aimed = rays(bodies.iter().map(|(_, body)| body), effort);
+    assert!(aimed >= at_least, "{aimed}");
+    let found = bodies.iter().map(|(name, body)| sweep(name, body, effort, &Control::none()));
     found.collect::<Result<Vec<_>, _>>().expect("not interrupted").concat()
 }
 
@@ -38,18 +46,14 @@ fn assert_explained(found: &[Found]) {
 
 #[test]
 fn a_million_rays_aimed_at_what_is_hard_are_neither_lost_nor_wrong_by_any_engine() {
-    let mut bodies = hard_bodies().expect("closed");
-    bodies.retain(|hard| hard.body.surface().mesh().faces.len() <= MOST_FACES);
-    let effort = Effort { rays: 7_000, recomputed: 60, seed: 3 };
-    let aimed = rays(bodies.iter().map(|hard| &hard.body), effort);
-    assert!(aimed >= 1_000_000, "{aimed}");
-    let found = swept(&bodies, effort);
+    let effort = Effort { rays: 9_000, recomputed: 60, seed: 3 };
+    let found = swept(&bodies(false), effort, 1_000_000);
     assert_explained(&found);
     for case in Case::ALL {
         for engine in ENGINES {
             let of_both = found.iter().filter(|found| found.case == case && found.engine == engine);
             let recomputed: u64 = of_both.map(|found| found.figures.recomputed).sum();
-            assert!(recomputed > 500, "{recomputed} by {engine:?}, {}", case.name());
+            assert!(recomputed > 300, "{recomputed} by {engine:?}, {}", case.name());
         }
     }
     // A length that rounding does not leave open is known to some 10⁻⁹ of the body's size at worst, far sources aside.
@@ -62,10 +66,8 @@ fn a_million_rays_aimed_at_what_is_hard_are_neither_lost_nor_wrong_by_any_engine
 #[test]
 #[ignore = "a hundred million rays, half an hour"]
 fn a_hundred_million_rays_aimed_at_what_is_hard_are_neither_lost_nor_wrong() {
-    let bodies = hard_bodies().expect("closed");
-    let effort = Effort { rays: 700_000, recomputed: 1_000, seed: 4 };
-    assert!(rays(bodies.iter().map(|hard| &hard.body), effort) >= 100_000_000);
-    assert_explained(&swept(&bodies, effort));
+    let effort = Effort { rays: 900_000, recomputed: 1_000, seed: 4 };
+    assert_explained(&swept(&bodies(true), effort, 100_000_000));
 }
 
 #[test]
@@ -77,7 +79,7 @@ fn bodies_nested_a_micrometre_apart_differ_by_what_lies_between_them() {
             .expect("convex")
     };
     let (outer, inner) = (ball(50.0), ball(49.999));
-    let bodies = [&outer, &inner].map(|ball| chordfield::exact::Body::new(ball.surface().clone()));
+    let bodies = [&outer, &inner].map(|ball| Body::new(ball.surface().clone()));
     let mut parts = Vec::new();
     let (mut grazing, mut compared) = (0, 0);
     for vertex in inner.surface().mesh().vertices.iter().chain(&outer.surface().mesh().vertices) {
@@ -112,12 +114,11 @@ fn bodies_nested_a_micrometre_apart_differ_by_what_lies_between_them() {
 
 #[test]
 fn sweeps_are_the_same_for_one_two_and_eight_threads() {
-    let bodies = hard_bodies().expect("closed");
-    let hard = bodies.iter().find(|hard| hard.name == "ball of 80 faces").expect("it is there");
+    let body = HARD_BODIES[2].body().expect("closed");
     let effort = Effort { rays: 3_000, recomputed: 20, seed: 5 };
     let by = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        pool.install(|| sweep(hard.name, &hard.body, effort, &Control::none()).expect("not interrupted"))
+        pool.install(|| sweep("ball", &body, effort, &Control::none()).expect("not interrupted"))
     };
     let one = by(1);
     assert!(one == by(2) && one == by(8));
@@ -132,7 +133,7 @@ fn the_documented_table_has_every_case_and_body_and_none_lost() {
         .map(|line| line.split('|').map(str::trim).collect())
         .collect();
     let cases = Case::ALL.map(Case::name);
-    for name in cases.into_iter().chain(hard_bodies().expect("closed").iter().map(|hard| hard.name)) {
+    for name in cases.into_iter().chain(HARD_BODIES.map(|hard| hard.name)) {
         assert!(rows.iter().any(|row| row[1] == name), "{name} is missing: make the table again");
     }
     assert!(rows.iter().all(|row| row[4] == "0"), "rays are lost");

@@ -1,10 +1,12 @@
 //! What rounding may make of a length, and what it may not.
 
+use glam::DVec3;
+
 use crate::exact::judge::length_in_parallel_body;
 use crate::exact::rational::{RationalChord, of_triangles};
 use crate::exact::{Body, Engine};
-use crate::geometry::numeric::gamma;
-use crate::geometry::{ConvexMesh, Segment};
+use crate::geometry::numeric::{gamma, unit_normal};
+use crate::geometry::{ConvexMesh, Interval, Segment};
 
 /// How far rounding moves planes or vertices by an engine's promise, over their distance from the source; twice that, as the
 /// judge's own planes are rounded too.
@@ -45,13 +47,7 @@ impl<'a> Explained<'a> {
 
     /// The least and the greatest length of a ray that rounding explains, mm, by an engine that says `length_mm`. `exact` is the
     /// one without rounding, found if not given.
-    pub fn by_rounding(
-        &self,
-        engine: Engine,
-        ray: usize,
-        length_mm: f64,
-        exact: Option<&RationalChord>,
-    ) -> [f64; 2] {
+    pub fn by_rounding(&self, engine: Engine, ray: usize, _: f64, exact: Option<&RationalChord>) -> [f64; 2] {
         let (body, at) = (self.body, &self.rays[ray]);
         let shift = shift_mm(body, engine, at);
         match body.convexity() {
@@ -59,10 +55,8 @@ impl<'a> Explained<'a> {
             Ok(_) => self.in_parallel_bodies[ray],
             Err(_) => {
                 let exact_mm = exact.map_or_else(|| exact_length(body, at), RationalChord::length_mm);
-                // Where there is nothing to explain, nothing is looked for.
-                let is_near = (length_mm - exact_mm).abs() <= 2.0 * shift;
-                let by_itself = [exact_mm - 2.0 * shift, exact_mm + 2.0 * shift];
-                if is_near { by_itself } else { between_moved_rays(body, at, shift, exact_mm) }
+                let open = near_surface_mm(body, at, shift) + 2.0 * shift;
+                [exact_mm - open, exact_mm + open]
             }
         }
     }
@@ -77,25 +71,41 @@ fn exact_length(body: &Body, ray: &Segment) -> f64 {
     of_triangles(body.surface(), ray.line()).within(&ray.reach()).length_mm()
 }
 
-/// No body is parallel to one that is not convex: the lengths of rays near by stand for it, without rounding. Their spread is
-/// taken thrice, for ends of several parts move each by itself.
-fn between_moved_rays(body: &Body, ray: &Segment, shift: f64, exact_mm: f64) -> [f64; 2] {
-    let [source, target] = [0.0, ray.length_mm()].map(|t| ray.line().at(t));
-    let (u, v) = ray.line().dir().any_orthonormal_pair();
-    let moves = [u, -u, v, -v].map(|to| 2.0 * shift * to);
-    let pairs = moves.iter().flat_map(|a| moves.iter().map(move |b| (source + *a, target + *b)));
-    let moved = pairs.filter_map(|(from, to)| Segment::between(from, to));
-    let [least, most] = moved.fold([exact_mm; 2], |[least, most], ray| {
-        let length = exact_length(body, &ray);
-        [f64::min(least, length), f64::max(most, length)]
-    });
-    [exact_mm - 3.0 * (exact_mm - least) - 2.0 * shift, exact_mm + 3.0 * (most - exact_mm) + 2.0 * shift]
+/// How much of a ray is no farther than `shift` from a body's surface, mm: what a surface that moves by so much may win or lose.
+/// A little more near the corners of faces, which are taken to be as sharp when they are moved.
+fn near_surface_mm(body: &Body, ray: &Segment, shift: f64) -> f64 {
+    let mut near: Vec<Interval> =
+        body.surface().mesh().triangles().filter_map(|face| near_face(face, ray, shift)).collect();
+    near.sort_by(|a, b| a.start().total_cmp(&b.start()));
+    let (mut total, mut end) = (0.0, f64::NEG_INFINITY);
+    for part in near {
+        total += (part.end() - part.start().max(end)).max(0.0);
+        end = end.max(part.end());
+    }
+    total
+}
+
+/// The part of a ray in a face's prism: between planes beside it and beyond its edges, all `shift` off.
+fn near_face(face: [DVec3; 3], ray: &Segment, shift: f64) -> Option<Interval> {
+    let normal = unit_normal(face)?;
+    let (o, d) = (ray.line().origin(), ray.line().dir());
+    let outward = |i: usize| (face[(i + 1) % 3] - face[i]).cross(normal).normalize_or_zero();
+    let sides =
+        [(face[0], normal), (face[0], -normal)].into_iter().chain((0..3).map(|i| (face[i], outward(i))));
+    sides.into_iter().try_fold(ray.reach(), |part, (point, outward)| {
+        let (height, slope) = (outward.dot(point - o) + shift, outward.dot(d));
+        let within = match slope {
+            _ if slope > 0.0 => Interval::new(f64::NEG_INFINITY, height / slope),
+            _ if slope < 0.0 => Interval::new(height / slope, f64::INFINITY),
+            _ if height < 0.0 => None,
+            _ => Some(Interval::EVERYTHING),
+        };
+        part.intersection(&within?)
+    })
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
-
     use super::*;
     use crate::geometry::ClosedMesh;
     use crate::geometry::primitives::{cube, icosphere, inside_out};

@@ -24,7 +24,8 @@
 //! angle whose sine is a moves its end of the chord by s / a; a chord whose middle is h below the outline of a ball of radius R
 //! is 2√(2Rh) long, and √(s / h) of that, relatively, is open; a tangent is hit or missed by chance, whole in the plane of a
 //! flat side. So errors of 10⁻⁶ mm of tangents are no fault, and a vertex missed from outside of s is one. Bodies that are not
-//! convex have no parallel ones: rays moved by up to 2s at both ends stand for them, without rounding.
+//! convex have no parallel ones. But a point farther than s from their surface is inside after a move if it was before: **no
+//! length may differ from the exact one by more than the part of the ray that is within s of the surface.**
 //!
 //! A ray is **lost** if even the body moved inwards has a chord along it and the engine says 0.
 //!
@@ -55,7 +56,7 @@ use crate::exact::rational::{RationalChord, of_planes, of_triangles};
 use crate::exact::{Body, Engine, Lengths};
 use crate::geometry::{RayGrid, Segment, Upstream};
 
-pub use bodies::{HardBody, hard_bodies};
+pub use bodies::{HARD_BODIES, HardBody};
 pub use cases::Case;
 pub use table::table;
 
@@ -66,7 +67,7 @@ pub const ENGINES: [Engine; 4] = [Engine::Clip, Engine::Walk, Engine::Raster, En
 const BLOCK: u64 = 1024;
 
 /// Bodies of more faces than this are asked along fewer rays, in proportion: what a ray costs grows with the faces.
-const FACES_AT_FULL_EFFORT: u64 = 2_000;
+const FACES_AT_FULL_EFFORT: u64 = 500;
 
 /// Of the body's size: rounding that may change a length by more leaves it open.
 const OPEN_SHARE: f64 = 1e-6;
