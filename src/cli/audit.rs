@@ -8,10 +8,10 @@ use serde::Serialize;
 
 use super::args::{AuditArgs, RayArgs};
 use super::project::{change, method, method_named, open};
-use super::{Outcome, Session, print};
+use super::{Outcome, Session, command_line, print, shell_words};
 use crate::error::{Error, Result};
 use crate::modes::Control;
-use crate::modes::audit::{Audit, AuditReport, AuditSettings, Probe, RaySet, shell_word};
+use crate::modes::audit::{Audit, AuditReport, AuditSettings, Probe, RaySet};
 use crate::modes::figures::Figures;
 use crate::modes::oracles::{self, Oracles, Size};
 use crate::modes::project::Method;
@@ -55,7 +55,7 @@ pub fn run(args: &AuditArgs, session: &Session, out: &mut dyn Write) -> Result<O
     let control = Control::new(session.cancel(), &advance);
     let words: Vec<String> = std::env::args().skip(1).collect();
     let mut report = audit.run(&control)?;
-    report.command = format!("chordfield {}", shell_words(&words));
+    report.command = command_line();
     for worst in &mut report.worst {
         worst.reproduce = format!("chordfield {} {}", shell_words(&setting_words(&words)), worst.reproduce);
     }
@@ -239,10 +239,6 @@ fn setting_words(words: &[String]) -> Vec<String> {
         }
     }
     kept
-}
-
-fn shell_words(words: &[String]) -> String {
-    words.iter().map(|word| shell_word(word)).collect::<Vec<_>>().join(" ")
 }
 
 /// The report in a few lines.

@@ -25,7 +25,7 @@ pub const COLOURS: [&str; 8] =
 /// One curve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
-    /// What it is called.
+    /// What it is called in the legend; not in it if empty.
     pub name: String,
     /// Its colour, as CSS.
     pub colour: &'static str,
@@ -84,15 +84,14 @@ impl Curves<'_> {
         }
         let entry =
             |c: &Curve| format!("<span><i style=\"background:{}\"></i>{}</span>", c.colour, escape(&c.name));
-        let legend: String = self.curves.iter().map(entry).collect();
+        let legend: String = self.named().map(entry).collect();
         format!("<figure>{svg}<p class=\"legend\">{legend}</p></figure>")
     }
 
     /// The plot as an SVG file. Empty if no point can be shown.
     pub fn file(&self) -> String {
         let legend: String = self
-            .curves
-            .iter()
+            .named()
             .enumerate()
             .map(|(i, curve)| {
                 let y = TOP + 14.0 + 14.0 * i as f64;
@@ -110,6 +109,11 @@ impl Curves<'_> {
         let head =
             format!("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{HEIGHT}\" ");
         svg.replacen("<svg ", &head, 1).replacen('>', &format!("><style>{STYLE}</style>"), 1)
+    }
+
+    /// The curves of the legend: all that have a name.
+    fn named(&self) -> impl Iterator<Item = &Curve> {
+        self.curves.iter().filter(|curve| !curve.name.is_empty())
     }
 
     fn svg(&self, extra: &str) -> String {
@@ -191,11 +195,10 @@ fn draw(curve: &Curve, points: &[Point], x: &Scale, y: &Scale, svg: &mut String)
     for point in points {
         let _ = write!(
             svg,
-            "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"3.2\" fill=\"{}\"><title>{} {}: {}, {}</title></circle>",
+            "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"3.2\" fill=\"{}\"><title>{}: {}, {}</title></circle>",
             x.at(point.x),
             y.at(point.y),
             curve.colour,
-            escape(&curve.name),
             escape(&point.name),
             short(point.x),
             short(point.y)
