@@ -109,8 +109,9 @@ fn audits_stopped_write_nothing() {
 }
 
 #[test]
-fn oracles_sweeps_and_checks_are_stopped_at_once() {
-    for args in [&["audit", "adult", "--oracles"][..], &["audit", "balls.toml", "--stress", "1e9"]] {
+fn oracles_sweeps_benchmarks_and_checks_are_stopped_at_once() {
+    let (oracles, stress) = (["audit", "adult", "--oracles"], ["audit", "balls.toml", "--stress", "1e9"]);
+    for args in [&oracles[..], &stress, &["bench", "curve", "balls.toml"]] {
         stop(args, 200, |folder| assert_eq!(files(folder), [folder.join("balls.toml")]));
     }
     stop(&["check", "adult", "adult", "adult", "adult", "adult", "adult"], 50, |_| {});

@@ -11,7 +11,7 @@ use super::project::{change, method, method_named, open};
 use super::{Outcome, Session, command_line, print, shell_words};
 use crate::error::{Error, Result};
 use crate::modes::Control;
-use crate::modes::audit::{Audit, AuditReport, AuditSettings, Probe, RaySet};
+use crate::modes::audit::{Audit, AuditReport, AuditSettings, Probe, RaySet, shell_word};
 use crate::modes::figures::Figures;
 use crate::modes::oracles::{self, Oracles, Size};
 use crate::modes::project::Method;

@@ -277,7 +277,7 @@ fn trace_block(body: &Body, rays: &[Aimed], recomputed: u64) -> [Figures; ENGINE
                 (Engine::Clip, Some(planes)) => planes,
                 _ => triangles,
             });
-            let between = explained.by_rounding(engine, i, length_mm, exact);
+            let between = explained.by_rounding(engine, i, exact);
             figures.add(body, ray, length_mm, between, exact);
         }
         figures
