@@ -108,7 +108,8 @@ impl Error {
         (format!("{self}{cause}"), remedy)
     }
 
-    /// The process exit code of this error: 130 for an interruption, 2 for everything else.
+    /// The process exit code of this error: 130 for an interruption (143 if it was a request to terminate, which only the
+    /// program knows), 2 for everything else.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Interrupted => 130,

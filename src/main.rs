@@ -12,7 +12,7 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let session = Session::new(cli.quiet);
     if let Err(error) = prepare(&cli, &session) {
-        return fail(&error);
+        return fail(&error, &session);
     }
     match cli::run(&cli, &session, &mut io::stdout().lock()) {
         Ok(outcome) => {
@@ -24,7 +24,7 @@ fn main() -> ExitCode {
         }
         // Whoever read our output has seen enough (`| head`).
         Err(Error::Io { source, .. }) if source.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
-        Err(error) => fail(&error),
+        Err(error) => fail(&error, &session),
     }
 }
 
@@ -39,15 +39,33 @@ fn prepare(cli: &Cli, session: &Session) -> Result<(), Error> {
         .build_global()
         .map_err(|e| refused("threads", &e))?;
     let leave_at_once = session.canceller();
-    let stop = move || {
-        if leave_at_once() {
-            std::process::exit(Error::Interrupted.exit_code().into());
+    let stop = move |exit_code: u8| {
+        if leave_at_once(exit_code) {
+            std::process::exit(exit_code.into());
         }
     };
-    ctrlc::set_handler(stop).map_err(|e| refused("signals", &e))
+    on_signals(stop).map_err(|e| refused("signals", &*e))
 }
 
-fn fail(error: &Error) -> ExitCode {
+/// Calls `stop`, on a thread of its own, with the exit code by which shells tell the signal: 128 and its number.
+#[cfg(unix)]
+fn on_signals(stop: impl Fn(u8) + Send + 'static) -> Result<(), Box<dyn std::error::Error>> {
+    use signal_hook::consts::{SIGINT, SIGTERM};
+    // Not SIGHUP, which `nohup` has ignored: to catch it would be to heed it.
+    let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM])?;
+    std::thread::Builder::new()
+        .name("signals".into())
+        .spawn(move || signals.forever().for_each(|signal| stop(128 + signal as u8)))?;
+    Ok(())
+}
+
+/// Calls `stop`, on a thread of its own, when the user asks for it.
+#[cfg(not(unix))]
+fn on_signals(stop: impl Fn(u8) + Send + 'static) -> Result<(), Box<dyn std::error::Error>> {
+    Ok(ctrlc::set_handler(move || stop(Error::Interrupted.exit_code()))?)
+}
+
+fn fail(error: &Error, session: &Session) -> ExitCode {
     let stderr = io::stderr();
     let theme = if stderr.is_terminal() { GraphicalTheme::unicode() } else { GraphicalTheme::none() };
     let mut text = String::new();
@@ -56,5 +74,5 @@ fn fail(error: &Error) -> ExitCode {
     }
     // Nobody is left to tell if standard error is gone.
     let _ = writeln!(stderr.lock(), "{}", text.trim_end());
-    ExitCode::from(error.exit_code())
+    ExitCode::from(session.exit_code(error))
 }

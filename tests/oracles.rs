@@ -33,7 +33,7 @@ fn all_phantoms_satisfy_every_oracle_by_every_method() {
     let engines = [Engine::Clip, Engine::Walk, Engine::Raster, Engine::Bvh].map(|e| Method::Exact(Some(e)));
     for phantom in ["adult", "adult-skeleton", "head", "calibration"] {
         for method in engines.into_iter().chain([Method::RiTree(TreeSettings::default())]) {
-            assert_satisfied(phantom, method, Size::default());
+            assert_satisfied(phantom, method, Size::of(method));
         }
     }
 }

@@ -2,9 +2,10 @@
 
 mod common;
 
+use chordfield::linespace::{Cell, LinePoint, PlanePair};
 use chordfield::modes::Control;
 use chordfield::modes::project::{Found, Method, Projection, Projector, TreeSettings, Wanted};
-use chordfield::ritree::Parameters;
+use chordfield::ritree::{Attribute, Cache, Parameters, RiTree, oldest_to_keep};
 use chordfield::scene::Scene;
 use common::{nested_balls, scene};
 
@@ -138,4 +139,105 @@ fn a_source_inside_the_box_is_traced() {
     let exact = Projector::new(&scene, LENGTHS, None, Method::Exact(None)).expect("a projector");
     assert_eq!(near.own_length_mm(0), view(&exact, &scene, 0).own_length_mm(0));
     assert!(near.queries().traced_source_or_target_inside > 0);
+}
+
+#[test]
+fn trees_of_any_tolerance_depth_and_cache_stay_whole_and_keep_their_answers() {
+    let scene = cone_scene(24);
+    let exact = Projector::new(&scene, LENGTHS, None, Method::Exact(None)).expect("a projector");
+    let exact = view(&exact, &scene, 0).own_length_mm(1);
+    for (distance_threshold, max_depth) in
+        [(0.0, 12), (f64::MIN_POSITIVE, 20), (f64::MAX, 28), (0.02, 0), (0.02, 60)]
+    {
+        let parameters = Parameters { distance_threshold, max_depth, ..Parameters::default() };
+        let mut first = None;
+        for cache_bytes in [100_000_000, 100_000, 1_000, 0] {
+            let settings = TreeSettings { parameters, cache_bytes, ..TreeSettings::default() };
+            let projector = projector(&scene, settings);
+            let views = [0, 1].map(|i| bits(&view(&projector, &scene, i)));
+            projector.check_invariants();
+            let expected = first.get_or_insert_with(|| views.clone());
+            assert!(*expected == views, "{distance_threshold}, depth {max_depth}, {cache_bytes} bytes");
+        }
+        // Whatever is traced is exact; whatever is interpolated is a length.
+        let settings = TreeSettings { parameters, ..TreeSettings::default() };
+        let lengths = view(&projector(&scene, settings), &scene, 0).own_length_mm(1);
+        assert!(lengths.iter().all(|length| (0.0..=40.5).contains(length)), "{distance_threshold}");
+        if max_depth == 0 {
+            assert_eq!(lengths, exact, "a root cell holds lines that hit and lines that miss");
+        }
+    }
+}
+
+/// An attribute whose cells always split.
+struct Rough;
+
+impl Attribute for Rough {
+    type Output = f64;
+
+    fn sample(&self, line: LinePoint) -> f64 {
+        line.stuv.iter().map(|x| (1e3 * x).fract()).sum()
+    }
+
+    fn class(&self, _: &f64) -> u32 {
+        1
+    }
+
+    fn is_miss(&self, _: u32) -> bool {
+        false
+    }
+
+    fn distance(&self, _: &f64, _: &f64) -> f64 {
+        1.0
+    }
+
+    fn interpolate(&self, parts: &[(f64, &f64)]) -> f64 {
+        parts.iter().map(|(weight, value)| weight * *value).sum()
+    }
+
+    fn is_certainly_empty(&self, _: PlanePair, _: &Cell) -> bool {
+        false
+    }
+}
+
+#[test]
+fn a_million_cells_are_grown_checked_and_forgotten() {
+    let (mut tree, cache) = (
+        RiTree::new(Rough, Parameters { distance_threshold: 0.5, max_depth: 18, ..Parameters::default() }),
+        Cache::new(usize::MAX),
+    );
+    let mut state = 1_u64;
+    let mut unit = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    for i in 0..800_000 {
+        let stuv = [0; 4].map(|_| 3.0 * unit() - 1.0);
+        let _ = tree.query(LinePoint { pair: PlanePair::ALL[i % 6], stuv }, &cache);
+    }
+    let cells: u64 = tree.shape().leaves_by_depth.iter().sum::<u64>();
+    assert!(2 * cells > 1_000_000, "{cells} leaves and as many nodes");
+    assert_eq!(tree.check_invariants(), cache.used_bytes());
+    tree.prune(u32::MAX, &cache);
+    assert_eq!((tree.check_invariants(), cache.used_bytes()), (0, 0));
+}
+
+#[test]
+fn at_the_end_of_time_trees_are_pruned_without_judgement_and_answer_alike() {
+    let (mut tree, cache) = (
+        RiTree::new(Rough, Parameters { distance_threshold: 0.5, max_depth: 9, ..Parameters::default() }),
+        Cache::new(1 << 20),
+    );
+    let point = |i: u32| LinePoint { pair: PlanePair::ALL[0], stuv: [0.1, 0.2, 0.3, f64::from(i) / 100.0] };
+    let ask = |tree: &RiTree<Rough>| (0..100).map(|i| tree.query(point(i), &cache)).collect::<Vec<_>>();
+    let before = ask(&tree);
+    tree.tick_to(u32::MAX);
+    tree.tick();
+    assert_eq!(ask(&tree), before);
+    let mut stamps = Vec::new();
+    tree.collect_stamps(&mut stamps);
+    assert!(stamps.iter().all(|stamp| stamp.0 == u32::MAX), "time stands still");
+    tree.prune(oldest_to_keep(stamps, 0), &cache);
+    assert_eq!(ask(&tree), before);
+    assert_eq!(tree.check_invariants(), cache.used_bytes());
 }

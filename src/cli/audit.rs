@@ -11,18 +11,28 @@ use super::project::{change, method, method_named, open};
 use super::{Outcome, Session, command_line, print, shell_words};
 use crate::error::{Error, Result};
 use crate::modes::Control;
-use crate::modes::audit::{Audit, AuditReport, AuditSettings, Probe, RaySet};
+use crate::modes::audit::{Audit, AuditReport, AuditSettings, Probe, RaySet, shell_word};
 use crate::modes::figures::Figures;
 use crate::modes::oracles::{self, Oracles, Size};
 use crate::modes::project::Method;
+use crate::modes::stability::{self, Effort};
 use crate::output::page::short;
 use crate::output::{audit as output, json};
-use crate::scene::Scene;
+use crate::scene::{Organ, Scene};
 
 /// Audits a scene: writes the report if a folder is named, says its sum on `out`, and tells whether a limit is broken.
 pub fn run(args: &AuditArgs, session: &Session, out: &mut dyn Write) -> Result<Outcome> {
     let mut scene = open(&args.scene)?;
     change(&mut scene, &args.beam, &args.source)?;
+    if let Some(rays) = args.stress {
+        return stress(
+            &scene,
+            Effort { rays, seed: args.rays.seed, ..Effort::default() },
+            args,
+            session,
+            out,
+        );
+    }
     let settings = AuditSettings {
         rays: rays(&args.rays, &scene)?,
         method: method(&args.method)?,
@@ -75,13 +85,55 @@ fn ask_oracles(
     let bar = session.progress(scene.organs.len() as u64, "organs");
     let advance = |organs| bar.inc(organs);
     let control = Control::new(session.cancel(), &advance);
-    let verdicts = Oracles::run(scene, method, args.rays.seed, Size::default(), &control)?;
+    let verdicts = Oracles::run(scene, method, args.rays.seed, Size::of(method), &control)?;
     bar.finish_and_clear();
     print(out, &if args.json { json::text(&verdicts)? } else { oracles::table(&verdicts) })?;
     let failed = verdicts.iter().filter(|v| v.outcome == oracles::Outcome::Failed).count();
     Ok(match failed {
         0 => Outcome::Done,
         _ => Outcome::LimitBroken(format!("{failed} of {} oracles failed", verdicts.len())),
+    })
+}
+
+/// Holds all exact engines to rationals where it is hard.
+fn stress(
+    scene: &Scene,
+    effort: Effort,
+    args: &AuditArgs,
+    session: &Session,
+    out: &mut dyn Write,
+) -> Result<Outcome> {
+    let bar = session.progress(stability::rays(scene.organs.iter().map(|organ| &organ.body), effort), "rays");
+    bar.set_message(scene.name.clone());
+    let advance = |rays| bar.inc(rays);
+    let control = Control::new(session.cancel(), &advance);
+    let sweep = |organ: &Organ| stability::sweep(&organ.name, &organ.body, effort, &control);
+    let found = scene.organs.iter().map(sweep).collect::<Result<Vec<_>>>()?.concat();
+    bar.finish_and_clear();
+    print(out, &if args.json { json::text(&found)? } else { stability::table(&found) })?;
+    let disagreements: u64 = found.iter().map(|found| found.figures.beyond).sum();
+    let first = found
+        .iter()
+        .find_map(|found| Some((found, found.figures.worst_ray?)).filter(|f| f.0.figures.beyond > 0));
+    Ok(match first {
+        None => Outcome::Done,
+        Some((found, [source, target])) => {
+            let [x, y, z] = source;
+            let path = glam::DVec3::from(target) - glam::DVec3::from(source);
+            Outcome::LimitBroken(format!(
+                "{disagreements} lengths are not what rounding explains; the first by {} in `{}`, {}; to see it again: \
+                 chordfield audit {} --method {} --ray={x},{y},{z},{},{},{} --organ {}",
+                found.engine.name(),
+                found.body,
+                found.case.name(),
+                shell_word(&args.scene),
+                found.engine.name(),
+                path.x,
+                path.y,
+                path.z,
+                shell_word(&found.body),
+            ))
+        }
     })
 }
 
@@ -220,6 +272,7 @@ fn summary(report: &AuditReport, folder: Option<&Path>) -> String {
     row("  traced, silhouette", &whole.traced_silhouette_mm);
     whole.accumulation.iter().for_each(|kind| row("accumulation", &kind.length_mm));
     whole.mesh.iter().for_each(|kind| row("mesh to closed form", &kind.length_mm));
+    whole.total.iter().for_each(|kind| row("method to closed form", &kind.length_mm));
     row("change of transmission", &report.transmission);
     if report.decided_by_rounding > 0 {
         let count = report.decided_by_rounding;

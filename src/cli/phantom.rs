@@ -5,6 +5,7 @@ use std::io::Write;
 use super::args::PhantomCommand;
 use super::{Session, print};
 use crate::error::Result;
+use crate::modes::Control;
 use crate::output::phantom::export;
 use crate::scene::{Scene, phantoms};
 
@@ -23,7 +24,7 @@ pub fn run(command: &PhantomCommand, session: &Session, out: &mut dyn Write) -> 
             let phantom = phantoms::find(name)?;
             let scene = Scene::phantom(name)?;
             session.begin_writing();
-            let file = export(&scene, phantom.toml, folder)?;
+            let file = export(&scene, phantom.toml, folder, &Control::new(session.cancel(), &|_| {}))?;
             session.remark(&format!("wrote {} and {} meshes beside it", file.display(), scene.organs.len()));
             Ok(())
         }

@@ -2,14 +2,18 @@
 
 use std::io::IsTerminal;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
+
+use crate::error::Error;
 
 /// One run of the program.
 pub struct Session {
     cancel: Arc<AtomicBool>,
     writes: Arc<AtomicBool>,
+    /// That of a run which was asked to stop.
+    exit_code: Arc<AtomicU8>,
     talks: bool,
 }
 
@@ -19,6 +23,7 @@ impl Session {
         Self {
             cancel: Arc::default(),
             writes: Arc::default(),
+            exit_code: Arc::new(AtomicU8::new(Error::Interrupted.exit_code())),
             talks: !quiet && std::io::stderr().is_terminal(),
         }
     }
@@ -33,11 +38,23 @@ impl Session {
         self.writes.store(true, Ordering::Relaxed);
     }
 
-    /// What to do when the user asks to stop; tells whether to leave the program at once. So it is while no file is
-    /// being written (scenes may take long to load), and when the user asks a second time.
-    pub fn canceller(&self) -> impl Fn() -> bool + Send + 'static {
+    /// What to do when the user asks to stop, given the exit code by which that is told; tells whether to leave the program at
+    /// once. So it is while no file is being written (scenes may take long to load), and when the user asks a second time.
+    pub fn canceller(&self) -> impl Fn(u8) -> bool + Send + 'static {
         let (cancel, writes) = (Arc::clone(&self.cancel), Arc::clone(&self.writes));
-        move || cancel.swap(true, Ordering::Relaxed) || !writes.load(Ordering::Relaxed)
+        let exit_code = Arc::clone(&self.exit_code);
+        move |code| {
+            exit_code.store(code, Ordering::Relaxed);
+            cancel.swap(true, Ordering::Relaxed) || !writes.load(Ordering::Relaxed)
+        }
+    }
+
+    /// The exit code for an error: of one that interrupts, that of the signal which did.
+    pub fn exit_code(&self, error: &Error) -> u8 {
+        match error {
+            Error::Interrupted => self.exit_code.load(Ordering::Relaxed),
+            other => other.exit_code(),
+        }
     }
 
     /// A progress bar over `total` of `unit`, on a terminal only. It goes when it is dropped, so that an error's message
@@ -70,10 +87,12 @@ mod tests {
     fn a_run_is_left_at_once_before_it_writes_and_when_asked_twice() {
         let (loading, writing) = (Session::new(true), Session::new(true));
         writing.begin_writing();
-        assert!(loading.canceller()());
+        assert!(loading.canceller()(130));
         let ask = writing.canceller();
-        assert!(!ask());
+        assert_eq!(writing.exit_code(&Error::Interrupted), 130);
+        assert!(!ask(143));
         assert!(writing.cancel().load(Ordering::Relaxed));
-        assert!(ask());
+        assert_eq!(writing.exit_code(&Error::Interrupted), 143);
+        assert!(ask(130));
     }
 }

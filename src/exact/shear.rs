@@ -11,6 +11,7 @@
 use glam::DVec3;
 
 use crate::geometry::Line;
+use crate::geometry::numeric::settled;
 
 /// A vertex in the line's frame.
 #[derive(Clone, Copy, Debug)]
@@ -49,7 +50,10 @@ impl Shear {
         let (x, y) = ((z + 1) % 3, (z + 2) % 3);
         // A mirrored frame would turn all windings round.
         let [first, second] = if d[z] < 0.0 { [y, x] } else { [x, y] };
-        let (to_first, to_second, inverse) = (-d[first] / d[z], -d[second] / d[z], 1.0 / d[z]);
+        // Origin, slopes and vertices are multiples of 2⁻²⁵², so coordinates across of 2⁻⁵⁰⁴ and their products of 2⁻¹⁰⁰⁸:
+        // nothing underflows, and the exact signs are exact.
+        let [to_first, to_second] = [first, second].map(|axis| settled(-d[axis] / d[z]));
+        let inverse = 1.0 / d[z];
         // Chosen, not stored by index: what is stored piecemeal is slow to load whole.
         let part = |axis: usize, own: usize, slope: f64| {
             if axis == own {
@@ -63,7 +67,7 @@ impl Shear {
         let row = |axis: usize| [part(axis, first, to_first), part(axis, second, to_second)];
         let along = |axis: usize| if axis == z { inverse } else { 0.0 };
         Self {
-            origin,
+            origin: DVec3::from(origin.to_array().map(settled)),
             axes: [first, second, z],
             across: [row(0), row(1), row(2)],
             along: DVec3::new(along(0), along(1), along(2)),

@@ -13,6 +13,7 @@ use glam::DVec3;
 use super::boxtree::BoxTree;
 use super::fault::{MeshFault, Notice};
 use super::inside::{Side, crossings_ahead, side_of_surface, winding_around};
+use super::numeric::settled;
 use super::rounding::rounding_tolerance_mm;
 use super::topology::{Components, Edges};
 use super::{Bounds, TriMesh};
@@ -37,9 +38,10 @@ impl ClosedMesh {
     ///
     /// # Errors
     /// The first fault found, with its place: see [`MeshFault`].
-    pub fn new(mut mesh: TriMesh) -> Result<(Self, Vec<Notice>), MeshFault> {
+    pub fn new(mesh: TriMesh) -> Result<(Self, Vec<Notice>), MeshFault> {
         let mut notices = Vec::new();
         check_numbers(&mesh)?;
+        let mut mesh = mesh.map_vertices(|v| DVec3::from(v.to_array().map(settled)));
         let before = mesh.faces.len();
         mesh.faces.retain(|&[a, b, c]| a != b && b != c && c != a);
         if mesh.faces.len() < before {

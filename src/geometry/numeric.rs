@@ -14,6 +14,15 @@ pub const fn gamma(n: u32) -> f64 {
     nu / (1.0 - nu)
 }
 
+/// `x` as a multiple of 2⁻²⁵²: itself from 2⁻¹⁴⁶ on, and less than 2⁻²⁵² off below, where no length in mm comes. Products of
+/// four such numbers do not underflow, as exact signs demand.
+#[inline(always)]
+pub fn settled(x: f64) -> f64 {
+    /// 2⁻²⁰⁰: its last place is 2⁻²⁵², to which the sum is rounded.
+    const LEAST: f64 = f64::from_bits((1023 - 200) << 52);
+    (x + LEAST) - LEAST
+}
+
 /// The sum of two f64 that do not overlap, about 32 decimal digits (Dekker, 1971, doi:10.1007/BF01397083).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DoubleDouble {
@@ -103,6 +112,19 @@ pub fn unit_normal([a, b, c]: [DVec3; 3]) -> Option<DVec3> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_numbers_too_small_for_any_length_are_settled() {
+        for x in [1.0, -std::f64::consts::PI, 1e-40, -1e-43, 1e15, f64::MAX] {
+            assert_eq!(settled(x), x);
+        }
+        for x in [f64::MIN_POSITIVE, -5e-324, 0.0, -0.0, 1e-80] {
+            assert_eq!(settled(x).to_bits(), 0.0_f64.to_bits());
+        }
+        let least = 2f64.powi(-252);
+        assert_eq!(settled(1e-61) % least, 0.0);
+        assert!((settled(1e-61) - 1e-61).abs() < least);
+    }
 
     #[test]
     fn a_needle_a_hundred_million_times_longer_than_wide_keeps_its_normal() {

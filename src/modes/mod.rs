@@ -8,5 +8,6 @@ pub mod figures;
 pub mod oracles;
 pub mod project;
 pub mod reference;
+pub mod stability;
 
 pub use control::Control;

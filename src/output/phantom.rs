@@ -8,6 +8,7 @@ use super::obj::{self, NamedMesh};
 use super::projection::{file_stems, safe_name};
 use super::{create_folder, write_atomically};
 use crate::error::{Error, Result};
+use crate::modes::Control;
 use crate::scene::Scene;
 
 /// Writes each organ's mesh to `folder/meshes` and the scene, which was built from `toml`, to `folder`; returns the
@@ -16,8 +17,8 @@ use crate::scene::Scene;
 /// Coordinates are written in full, so the exported scene has the same lengths to the last bit.
 ///
 /// # Errors
-/// A file that cannot be written. The scene file is written last, so it never names a mesh that is missing.
-pub fn export(scene: &Scene, toml: &str, folder: &Path) -> Result<PathBuf> {
+/// A file that cannot be written; a request to stop. The scene file is written last, so it never names a mesh that is missing.
+pub fn export(scene: &Scene, toml: &str, folder: &Path, control: &Control) -> Result<PathBuf> {
     let unreadable =
         |e: &dyn std::fmt::Display| Error::input(&scene.source, e.to_string(), "export a scene that loads");
     let mut document: Table = toml.parse().map_err(|e: toml::de::Error| unreadable(&e))?;
@@ -25,6 +26,7 @@ pub fn export(scene: &Scene, toml: &str, folder: &Path) -> Result<PathBuf> {
         document.get_mut("organ").and_then(Value::as_array_mut).ok_or_else(|| unreadable(&"no organs"))?;
     create_folder(&folder.join("meshes"))?;
     for ((organ, entry), stem) in scene.organs.iter().zip(organs).zip(file_stems(scene)) {
+        control.check()?;
         let file = format!("meshes/{stem}.obj");
         let title = format!("{} of the phantom {}, patient LPS, mm", organ.name, scene.name);
         let mesh = NamedMesh { name: &organ.name, mesh: organ.body.surface().mesh() };

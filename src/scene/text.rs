@@ -15,6 +15,10 @@ pub struct SceneText {
     text: String,
 }
 
+/// Longer messages, and lines of many bytes, are no person's work: they are cut short, or told by their numbers.
+const LONGEST_MESSAGE: usize = 300;
+const LONGEST_LINE: usize = 2_000;
+
 /// One step from a TOML value to a part of it.
 #[derive(Clone, Copy, Debug)]
 pub enum Step<'a> {
@@ -46,8 +50,9 @@ impl SceneText {
     /// Text that is not TOML, an unknown or duplicate key, a value of another type: with the place.
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T, Error> {
         toml::from_str(&self.text).map_err(|e| {
-            let message = e.message().trim_end().to_owned();
-            self.error_at(e.span(), message, "here", None)
+            // Of values nested without end, the parser says no more than that.
+            let remedy = e.span().is_none().then(|| "write the scene as the examples do".to_owned());
+            self.error_at(e.span(), e.message().trim_end(), "here", remedy)
         })
     }
 
@@ -69,13 +74,36 @@ impl SceneText {
         label: impl Into<String>,
         remedy: Option<String>,
     ) -> Error {
+        let mut message = shortened(message.into());
+        let span = span.filter(|span| {
+            let can_be_shown = self.can_show(span);
+            if !can_be_shown {
+                let (line, column) = self.place_of(span.start);
+                message += &format!(" (line {line}, column {column})");
+            }
+            can_be_shown
+        });
         Error::Scene(Box::new(SceneError {
-            message: message.into(),
+            message,
             source_code: NamedSource::new(&self.name, self.text.clone()),
             span: span.map(|s| (s.start, s.end.saturating_sub(s.start)).into()),
             label: label.into(),
             remedy,
         }))
+    }
+
+    /// Whether the lines of a span, and those before and after, are of a length to be shown.
+    fn can_show(&self, span: &Range<usize>) -> bool {
+        let (first, last) = (self.place_of(span.start).0, self.place_of(span.end).0);
+        let mut around = self.text.split('\n').take(last + 1).skip(first.saturating_sub(2));
+        around.all(|line| line.len() <= LONGEST_LINE)
+    }
+
+    /// Line and column, in bytes, of an offset, from 1.
+    fn place_of(&self, offset: usize) -> (usize, usize) {
+        let before = &self.text.as_bytes()[..offset.min(self.text.len())];
+        let line_start = before.iter().rposition(|&b| b == b'\n').map_or(0, |newline| newline + 1);
+        (before.iter().filter(|&&b| b == b'\n').count() + 1, before.len() - line_start + 1)
     }
 
     /// Where the value at `path` stands. Parses anew: errors are rare, and holding a spanned tree would tie every
@@ -103,6 +131,15 @@ impl SceneText {
         }
         span
     }
+}
+
+fn shortened(mut message: String) -> String {
+    if message.len() > LONGEST_MESSAGE {
+        let end = (0..=LONGEST_MESSAGE).rev().find(|&end| message.is_char_boundary(end));
+        message.truncate(end.unwrap_or(0));
+        message.push('…');
+    }
+    message
 }
 
 #[cfg(test)]
@@ -146,5 +183,20 @@ mod tests {
         assert_eq!(marked(&unknown), "color");
         let duplicate = parse("[[organ]]\ndensity = 1.0\ndensity = 2.0\n");
         assert!(duplicate.to_string().contains("duplicate key"), "{duplicate}");
+    }
+
+    #[test]
+    fn endless_keys_lines_and_nestings_are_told_in_a_sentence() {
+        let long_key = format!("{} = 1\n", "k".repeat(1 << 20));
+        let deep = format!("organ = {}{}\n", "[".repeat(1 << 20), "]".repeat(1 << 20));
+        let dotted = format!("{} = 1\n", vec!["a"; 1 << 20].join("."));
+        for text in [long_key, deep, dotted] {
+            let error = SceneText::new("a.toml", text).parse::<Doc>().unwrap_err();
+            let shown = format!("{:?}", miette::Report::new(error));
+            assert!(shown.len() < 2_000, "{} bytes", shown.len());
+        }
+        let far = format!("organ = []\nx = [{}]\n", "1, ".repeat(LONGEST_LINE));
+        let error = SceneText::new("a.toml", far).parse::<Doc>().unwrap_err();
+        assert!(error.to_string().ends_with("(line 2, column 1)"), "{error}");
     }
 }

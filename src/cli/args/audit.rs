@@ -39,6 +39,18 @@ pub struct AuditArgs {
     #[arg(long, conflicts_with_all = ["against", "output", "limit_mm"])]
     pub oracles: bool,
 
+    /// In place of a comparison: hold every exact engine to rationals, in each organ along so many rays of each kind that is
+    /// hard: through vertices, along edges, tangent, from far away … Exit with 1 if rounding does not explain a length.
+    #[arg(
+        long,
+        value_name = "N",
+        value_parser = parse_count,
+        num_args = 0..=1,
+        default_missing_value = "500",
+        conflicts_with_all = ["against", "output", "limit_mm", "oracles", "rays", "adversarial", "ray", "pixel"]
+    )]
+    pub stress: Option<u64>,
+
     /// Which rays are looked along.
     #[command(flatten)]
     pub rays: RayArgs,

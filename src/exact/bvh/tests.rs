@@ -348,3 +348,31 @@ fn tiny_huge_and_distant_bodies_are_traced() {
         }
     }
 }
+
+#[test]
+fn rays_with_denormal_slopes_are_not_lost_between_faces() {
+    // Vertices at x = 0, seen from a source all but there along a direction all but without x: products of what lies across
+    // underflowed, and with them the signs that say which face is met.
+    let ball = traced(icosphere(2).map_vertices(|v| 5e-7 * v));
+    let found = segment(
+        DVec3::new(-5.924643e-316, 7.232795161804073e-6, 1.1150188897337433e-6),
+        DVec3::new(5.924643e-316, -7.966870998410968e-6, -2.2691712658123123e-7),
+    );
+    let mut rng = Pcg64::seed_from_u64(19);
+    let near = |rng: &mut Pcg64| {
+        let tiny = f64::from_bits(rng.random_range(1..1 << 52));
+        let across = 3e-7 * vector(rng);
+        let out = DVec3::new(tiny, 1e-5, 4e-6 * rng.random_range(-1.0..1.0));
+        let through = DVec3::new(0.0, across.y, across.z);
+        Segment::between(through + out, through - out)
+    };
+    let others: Vec<Segment> = (0..20_000).filter_map(|_| near(&mut rng)).collect();
+    let (convex, rays) =
+        (ConvexMesh::new(ball.surface.clone()).expect("convex"), [vec![found], others].concat());
+    let mut lengths = vec![0.0; rays.len()];
+    ball.bvh.trace_all(&ball.surface, 0, &rays, &mut Lengths(&mut lengths));
+    for (ray, length) in rays.iter().zip(lengths) {
+        let exact = crate::exact::rational::of_planes(&convex, ray.line()).length_mm();
+        assert!((length - exact).abs() < 1e-19, "{length}, not {exact}: {ray:?}");
+    }
+}

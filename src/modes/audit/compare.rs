@@ -309,9 +309,16 @@ impl AtWork<'_> {
                 let error = sum.length_mm - reference_mm;
                 ledger.organ(organ).accumulation.add(error, reference_mm, change(error));
             }
-            if let Some(&true_mm) = answers.closed_form.get(i).filter(|&&l| l != 0.0 || reference_mm != 0.0) {
-                let error = reference_mm - true_mm;
-                ledger.organ(organ).mesh.add(error, true_mm, change(error));
+            if let Some(&true_mm) = answers.closed_form.get(i) {
+                let of_organ = ledger.organ(organ);
+                for (kind, length_mm) in
+                    [(&mut of_organ.mesh, reference_mm), (&mut of_organ.total, method_mm)]
+                {
+                    if !(length_mm == 0.0 && true_mm == 0.0) {
+                        let error = length_mm - true_mm;
+                        kind.add(error, true_mm, change(error));
+                    }
+                }
             }
         }
     }

@@ -62,6 +62,8 @@ pub(super) struct OrganLedger {
     pub accumulation: KindLedger,
     /// Of the reference on the mesh against the closed form.
     pub mesh: KindLedger,
+    /// Of the method against the closed form: all there is between the answer and the shape.
+    pub total: KindLedger,
 }
 
 impl OrganLedger {
@@ -72,7 +74,8 @@ impl OrganLedger {
             method: kind.clone(),
             parts: [[tally(), tally()], [tally(), tally()]],
             accumulation: kind.clone(),
-            mesh: kind,
+            mesh: kind.clone(),
+            total: kind,
         }
     }
 
@@ -87,6 +90,7 @@ impl AddAssign<&Self> for OrganLedger {
         self.method += &other.method;
         self.accumulation += &other.accumulation;
         self.mesh += &other.mesh;
+        self.total += &other.total;
         let others = other.parts.iter().flatten();
         self.parts.iter_mut().flatten().zip(others).for_each(|(part, other)| *part += other);
     }

@@ -7,13 +7,14 @@
 //!   adversarial
 //! ```
 //!
-//! Three kinds of error are kept apart:
+//! Three kinds of error are kept apart, and told once more together:
 //!
 //! | kind | is | by |
 //! |---|---|---|
 //! | method | the method's length − the reference's | interpolation, or an engine's rounding |
 //! | accumulation | sums along an image's rays − the reference's | rounding that grows with the distance from the source |
 //! | mesh | the reference's − the closed form's | flat faces in place of the curved surface |
+//! | total | the method's − the closed form's | both: how far the answer is from the shape that was meant |
 //!
 //! The reference is half-space clipping for convex bodies and the hierarchy of boxes for others, each ray by itself, unless
 //! another method is named. A ray that misses an organ for both is not counted. Figures are the same for any
@@ -50,6 +51,7 @@ use worst::Origin;
 
 pub use compare::SILHOUETTE_SHARE;
 pub use picture::Pictures;
+pub(super) use rays::Archer;
 pub use rays::{Aim, RaySet};
 pub use reference::ReferenceError;
 pub use report::{AuditReport, Bar, DistanceFigures, KindFigures, OrganFigures, RayWords, SectionFigures};

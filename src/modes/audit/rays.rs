@@ -147,7 +147,7 @@ impl<'a> Lines<'a> {
         }
         let (blocks, organs) = (self.rays.div_ceil(BLOCK).max(1), self.bodies.len() as u64);
         let count = BLOCK.min(self.rays - block % blocks * BLOCK);
-        let mut archer = Archer { rng: block_rng(self.seed, block) };
+        let mut archer = Archer::of_block(self.seed, block);
         let aimed = self.aims.get((block / (blocks * organs.max(1))) as usize);
         let shot = |_| {
             let (point, dir) = match aimed {
@@ -186,11 +186,16 @@ fn block_rng(seed: u64, block: u64) -> Pcg64 {
 }
 
 /// Makes lines: a point and a direction of unit length each.
-struct Archer {
+pub(in crate::modes) struct Archer {
     rng: Pcg64,
 }
 
 impl Archer {
+    /// With the random numbers of a block.
+    pub fn of_block(seed: u64, block: u64) -> Self {
+        Self { rng: block_rng(seed, block) }
+    }
+
     /// Uniform and isotropic: a direction uniform on the sphere, and a point uniform on the ball's disc across it.
     fn random(&mut self, ball: &Ball) -> (DVec3, DVec3) {
         let dir = self.direction();
@@ -200,7 +205,7 @@ impl Archer {
     }
 
     /// At what is hard of one body.
-    fn aimed(&mut self, aim: Aim, body: &Body) -> Option<(DVec3, DVec3)> {
+    pub fn aimed(&mut self, aim: Aim, body: &Body) -> Option<(DVec3, DVec3)> {
         let bounds = body.bounds();
         let mesh = body.surface().mesh();
         let [a, b, c] = mesh.triangle(self.below(mesh.faces.len() as u64) as usize);
@@ -240,20 +245,22 @@ impl Archer {
     }
 
     /// A point of the box.
-    fn inside(&mut self, bounds: &Bounds) -> DVec3 {
+    pub fn inside(&mut self, bounds: &Bounds) -> DVec3 {
         bounds.min + bounds.size() * DVec3::new(self.unit(), self.unit(), self.unit())
     }
 
-    fn direction(&mut self) -> DVec3 {
+    /// Uniform over the sphere.
+    pub fn direction(&mut self) -> DVec3 {
         DVec3::from(Distribution::<[f64; 3]>::sample(&UnitSphere, &mut self.rng))
     }
 
     /// From 0 to below 1.
-    fn unit(&mut self) -> f64 {
+    pub fn unit(&mut self) -> f64 {
         (self.rng.next_u64() >> 11) as f64 * (0.5 * f64::EPSILON)
     }
 
-    fn below(&mut self, n: u64) -> u64 {
+    /// A whole number from 0 to below `n`.
+    pub fn below(&mut self, n: u64) -> u64 {
         self.rng.next_u64() % n.max(1)
     }
 }

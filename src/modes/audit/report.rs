@@ -108,6 +108,9 @@ pub struct OrganFigures {
     /// Of the reference on the mesh against the closed form, on rays that meet either.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<KindFigures>,
+    /// Of the method against the closed form, on rays that meet either: interpolation and flat faces together.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub total: Option<KindFigures>,
     /// Why there is no closed form.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub no_closed_form: Option<&'static str>,
@@ -243,6 +246,7 @@ impl OrganFigures {
             traced_silhouette_mm: part(&traced[1]),
             accumulation: has_views.then(|| kind(&ledger.accumulation)),
             mesh: (ledger.mesh.length_mm.count() > 0).then(|| kind(&ledger.mesh)),
+            total: (ledger.total.length_mm.count() > 0).then(|| kind(&ledger.total)),
             no_closed_form: None,
             histogram: bars([interpolated, traced].map(|zones| {
                 let mut both = zones[0].histogram().clone();

@@ -7,6 +7,7 @@ use super::*;
 use crate::attributes::chord::{Chord, ChordLength};
 use crate::exact::{Pierced, Way};
 use crate::linespace::{Cell, LinePoint, PlanePair};
+use crate::modes::figures::Figures;
 use crate::modes::project::TreeSettings;
 use crate::ritree::{self, Attribute, Cache, Parameters, RiTree};
 use crate::scene::{Folder, SceneText};
@@ -295,6 +296,22 @@ fn the_mesh_lies_under_its_shape_by_no_more_than_its_depth_allows_and_exact_meth
     let counted: u64 = report.by_distance.iter().map(|d| d.length_mm.compared).sum();
     assert_eq!(counted, report.whole.method.length_mm.compared);
     assert_eq!(report.by_distance[0].length_mm.max, 0.0, "nothing is found outside the outline");
+}
+
+#[test]
+fn the_error_to_the_closed_form_is_that_of_the_method_and_that_of_the_mesh_together() {
+    let scene = scene();
+    for method in [Method::Exact(None), Method::RiTree(TreeSettings::default())] {
+        let report = Audit::new(&scene, settings(&scene, method)).and_then(|a| a.run(&Control::none()));
+        for organ in report.expect("a report").organs {
+            let [method, mesh, total] = [Some(organ.method), organ.mesh, organ.total]
+                .map(|kind| kind.expect("a closed form").length_mm);
+            let sum = |figures: Figures| figures.bias * figures.compared as f64;
+            let (parts, whole) = (sum(method) + sum(mesh), sum(total));
+            assert!((parts - whole).abs() < 1e-9 * total.mean * total.compared as f64, "{parts} and {whole}");
+            assert!(total.max <= (method.max + mesh.max) * (1.0 + 1e-12));
+        }
+    }
 }
 
 #[test]

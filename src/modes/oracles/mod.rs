@@ -50,6 +50,17 @@ impl Default for Size {
     }
 }
 
+impl Size {
+    /// What it takes to try a method: some million rays for each organ, or a tenth of that for trees. Their promise is hundreds
+    /// of times as wide as what chance adds to a mean of so few, and each ray in a direction of its own grows them anew.
+    pub fn of(method: Method) -> Self {
+        match method {
+            Method::Exact(_) => Self::default(),
+            Method::RiTree(_) => Self { pixels: 24, lines: 4_000, directions: 1 },
+        }
+    }
+}
+
 /// Asks a witness about bodies and scenes.
 pub struct Oracles<'a> {
     witness: &'a dyn Witness,

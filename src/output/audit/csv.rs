@@ -26,6 +26,7 @@ fn kinds(organ: &OrganFigures) -> Vec<(&'static str, &'static str, &'static str,
         ("method", Some(&organ.method)),
         ("accumulation", organ.accumulation.as_ref()),
         ("mesh", organ.mesh.as_ref()),
+        ("total", organ.total.as_ref()),
     ];
     for (name, kind) in kinds.into_iter().filter_map(|(name, kind)| Some((name, kind?))) {
         rows.push((name, "length", "mm", &kind.length_mm));

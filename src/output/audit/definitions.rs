@@ -22,7 +22,7 @@ pub fn definitions(report: &AuditReport) -> String {
          <dt>Accumulation</dt><dd>Lengths summed along the rays of an image (the raster engine) against the \
          reference.</dd>\
          <dt>Mesh</dt><dd>The reference on the organ's flat faces against the closed form of its shape, on rays that meet \
-         either. Organs from files, of several shapes, tubes and torus sectors have none.</dd>\
+         either. Organs from files, of several shapes, tubes and torus sectors have none. The method against the closed form is both errors together.</dd>\
          <dt>ΔT</dt><dd>The change of T = exp(−Σ μL) by the error, at the mean energy of the photons; of a whole ray, or of \
          one organ's error alone.</dd>\
          <dt>Rounding</dt><dd>Of a ray in a convex organ: by how much its length changes if all faces move out, or in, by as \

@@ -126,12 +126,14 @@ fn kinds(report: &AuditReport) -> String {
         row("traced, silhouette", "part", &whole.traced_silhouette_mm),
         kind("accumulation: an image's sums", &whole.accumulation),
         kind("mesh against closed form", &whole.mesh),
+        kind("both: method against closed form", &whole.total),
     ];
     let changes = [
         row("whole ray, all organs", "strong", &report.transmission),
         change("method, each organ", &whole.method),
         whole.accumulation.as_ref().map_or(String::new(), |kind| change("accumulation, each organ", kind)),
         whole.mesh.as_ref().map_or(String::new(), |kind| change("mesh, each organ", kind)),
+        whole.total.as_ref().map_or(String::new(), |kind| change("method and mesh, each organ", kind)),
     ];
     format!(
         "<div class=\"wide\"><table><thead><tr><th>lengths, mm</th>{HEAD}</tr></thead><tbody>{}</tbody>\

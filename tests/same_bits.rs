@@ -1,0 +1,56 @@
+//! The same bits everywhere: by every engine's image, for any number of threads, however the program was optimised.
+#![cfg(all(target_os = "linux", target_arch = "x86_64"))]
+
+mod common;
+
+use chordfield::exact::Engine;
+use chordfield::modes::Control;
+use chordfield::modes::project::{Method, Projector, TreeSettings, Wanted};
+use common::{nested_balls, scene};
+
+/// Hashes (FNV-1a) of all images' bits. Both profiles hold them: `cargo test`, which optimises less, and `cargo test --release`.
+/// Where a change is meant to move the last digits, the failing test tells the new ones.
+const GOLDEN: [(&str, u64); 5] = [
+    ("clip", 0x7c21_ef2e_60e5_efb3),
+    ("walk", 0x7c21_ef2e_60e5_efb3),
+    ("raster", 0x7c21_ef2e_60e5_efb3),
+    ("bvh", 0x7c21_ef2e_60e5_efb3),
+    ("ritree", 0xcaaf_0916_f189_9181),
+];
+
+fn method(name: &str) -> Method {
+    match name {
+        "clip" => Method::Exact(Some(Engine::Clip)),
+        "walk" => Method::Exact(Some(Engine::Walk)),
+        "raster" => Method::Exact(Some(Engine::Raster)),
+        "bvh" => Method::Exact(Some(Engine::Bvh)),
+        _ => Method::RiTree(TreeSettings::default()),
+    }
+}
+
+fn hash_of_images(name: &str) -> u64 {
+    let text = nested_balls(48).replace("kind = \"parallel\"", "gantry_deg = [20, 200]\ncouch_deg = 15");
+    let scene = scene(&text).expect("a scene");
+    let wanted = Wanted { lengths: true, attenuation: true, colour: true };
+    let projector = Projector::new(&scene, wanted, None, method(name)).expect("a projector");
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    for (i, view) in scene.beam.views().expect("views").iter().enumerate() {
+        let image = projector.project(view, i as u64, &Control::none()).expect("a projection");
+        let lengths =
+            [image.own_length_mm(0), image.own_length_mm(1), image.line_integral().to_vec()].concat();
+        let all = lengths.into_iter().chain(image.colour().concat());
+        for byte in all.flat_map(|x: f32| x.to_le_bytes()) {
+            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+    }
+    hash
+}
+
+#[test]
+fn images_are_the_golden_bits_for_one_two_and_eight_threads() {
+    for threads in [1, 2, 8] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let found = GOLDEN.map(|(name, _)| (name, pool.install(|| hash_of_images(name))));
+        assert_eq!(found, GOLDEN, "{threads} threads: {found:#018x?}");
+    }
+}
