@@ -54,8 +54,11 @@ pub enum Reason {
 /// A cell of one plane pair, as deep in the tree as it is small.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
+    /// The plane pair.
     pub pair: PlanePair,
+    /// The cell.
     pub cell: Cell,
+    /// How often the root's cell was halved.
     pub depth: u32,
 }
 

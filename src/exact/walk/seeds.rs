@@ -94,6 +94,11 @@ impl SeedTable {
         table
     }
 
+    /// The middle, and the map from mm about it to the ball's frame.
+    pub fn ball_frame(&self) -> (DVec3, DMat3) {
+        (self.middle, self.to_ball)
+    }
+
     /// Seeds for the line from `o` along `d`, mm: the faces near where it would cross a ball about the middle as large as
     /// the body is there. `None` if it passes the ball by that holds the body, and so misses.
     #[inline]
