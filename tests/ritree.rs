@@ -3,7 +3,7 @@
 mod common;
 
 use chordfield::modes::Control;
-use chordfield::modes::project::{Found, Method, Projection, Projector, TreeSettings, Wanted};
+use chordfield::modes::project::{Found, Interpolation, Method, Projection, Projector, TreeSettings, Wanted};
 use chordfield::ritree::Parameters;
 use chordfield::scene::Scene;
 use common::{nested_balls, scene};
@@ -18,7 +18,8 @@ fn cone_scene(pixels: u32) -> Scene {
 
 fn settings(cache_bytes: usize) -> TreeSettings {
     let parameters = Parameters { distance_threshold: 0.02, max_depth: 20, ..Parameters::default() };
-    TreeSettings { parameters, cache_bytes, ..TreeSettings::default() }
+    let interpolation = Interpolation::Quadrilinear { parameters };
+    TreeSettings { interpolation, cache_bytes, ..TreeSettings::default() }
 }
 
 fn projector(scene: &Scene, settings: TreeSettings) -> Projector<'_> {
@@ -71,7 +72,13 @@ fn the_error_falls_with_the_threshold_and_tracing_with_the_depth() {
     let views = scene.beam.views().expect("views");
     let run = |distance_threshold: f64, max_depth: u32| {
         let parameters = Parameters { distance_threshold, max_depth, ..Parameters::default() };
-        let projector = projector(&scene, TreeSettings { parameters, ..TreeSettings::default() });
+        let projector = projector(
+            &scene,
+            TreeSettings {
+                interpolation: Interpolation::Quadrilinear { parameters },
+                ..TreeSettings::default()
+            },
+        );
         let projection = view(&projector, &scene, 0);
         assert_eq!(projector.spot_check(&[], 1, 3), None, "no views, nothing to compare");
         let error = projector.spot_check(&views[..1], 20_000, 3).expect("trees").mean;

@@ -96,9 +96,13 @@ mod tests {
     #[test]
     fn a_line_and_its_intercepts_are_the_same_line() {
         let to_ball = DMat3::from_rotation_y(0.3) * DMat3::from_diagonal(DVec3::new(0.01, 0.3, 2.0));
-        let frame =
-            LineFrame::new(DVec3::new(5.0, -40.0, 7.0), to_ball, DVec3::splat(-1.0), DVec3::new(1.0, 0.9, 0.5))
-                .expect("not flat");
+        let frame = LineFrame::new(
+            DVec3::new(5.0, -40.0, 7.0),
+            to_ball,
+            DVec3::splat(-1.0),
+            DVec3::new(1.0, 0.9, 0.5),
+        )
+        .expect("not flat");
         for (o, d) in [(DVec3::new(9.0, 3.0, -2.0), DVec3::X), (DVec3::ZERO, DVec3::new(-0.2, 0.9, 0.4))] {
             let (o_unit, d_unit) = (frame.point(o), frame.vector(d));
             let axis = LineFrame::dominant(d_unit);

@@ -208,7 +208,8 @@ impl Runs {
     /// Parts the pixels by whether `form` is at least 0 there, and visits the parts that are not empty: first those below.
     pub fn cut(&self, form: &PixelForm, mut visit: impl FnMut(bool, &Self)) {
         let Some([left, right, top, bottom]) = self.bounds() else { return };
-        let corners = [(left, top), (right, top), (left, bottom), (right, bottom)].map(|(c, r)| form.at(c, r));
+        let corners =
+            [(left, top), (right, top), (left, bottom), (right, bottom)].map(|(c, r)| form.at(c, r));
         if corners.iter().all(|&x| x >= 0.0) {
             return visit(true, self);
         }
@@ -229,7 +230,8 @@ impl Runs {
                 let row = f64::from(self.first_row) + i as f64;
                 let crossing = (form.at_origin + form.row * row) * inverse;
                 // A cast keeps within the range of integers.
-                let at = if rises { crossing.ceil() as i32 } else { (crossing.floor() as i32).saturating_add(1) };
+                let at =
+                    if rises { crossing.ceil() as i32 } else { (crossing.floor() as i32).saturating_add(1) };
                 let at = at.clamp(self.starts[i], self.ends[i].max(self.starts[i]));
                 let (first, second) = if rises { (&mut below, &mut above) } else { (&mut above, &mut below) };
                 first.ends[i] = at;

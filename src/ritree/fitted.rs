@@ -138,8 +138,7 @@ impl<F: Fit> FittedTree<F> {
                     return ask(&stamped.leaf, 4 * level);
                 }
                 None => {
-                    let place =
-                        (0..level).fold(Place::root(pair), |place, l| place.part(part_of(&steps, l)));
+                    let place = (0..level).fold(Place::root(pair), |place, l| place.part(part_of(&steps, l)));
                     if !self.expand(node, &place, cache) {
                         return self.ask_without_keeping(place, &steps, ask);
                     }
@@ -201,10 +200,17 @@ impl<F: Fit> FittedTree<F> {
                 }
             },
         };
-        self.visit_parts(&mut |bits, pixels| {
-            let node = parts.map(|parts| &parts[bits]);
-            self.visit_node(node, &place.part(bits), forms, pixels, cache, visit);
-        }, place, forms, pixels, 0, 0);
+        self.visit_parts(
+            &mut |bits, pixels| {
+                let node = parts.map(|parts| &parts[bits]);
+                self.visit_node(node, &place.part(bits), forms, pixels, cache, visit);
+            },
+            place,
+            forms,
+            pixels,
+            0,
+            0,
+        );
     }
 
     /// Parts the pixels by the part of the cell that they lie in, axis by axis.

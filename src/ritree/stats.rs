@@ -87,11 +87,14 @@ pub struct TreeShape {
 
 impl TreeShape {
     pub(super) fn add_leaf(&mut self, depth: usize, kind: Kind) {
-        self.count_leaf(depth, match kind {
-            Kind::Smooth => |shape| &mut shape.smooth_leaves,
-            Kind::Empty => |shape| &mut shape.empty_leaves,
-            Kind::TwoClasses | Kind::Traced(_) => |shape| &mut shape.traced_leaves,
-        });
+        self.count_leaf(
+            depth,
+            match kind {
+                Kind::Smooth => |shape| &mut shape.smooth_leaves,
+                Kind::Empty => |shape| &mut shape.empty_leaves,
+                Kind::TwoClasses | Kind::Traced(_) => |shape| &mut shape.traced_leaves,
+            },
+        );
     }
 
     /// Counts a leaf of some depth in one of the numbers.

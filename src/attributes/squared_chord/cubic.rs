@@ -225,8 +225,12 @@ mod tests {
             assert!((of_terms - value).abs() < 1e-13);
         }
         let full = design.fit_complete(&values[..FIT_LINES]);
-        let half: Vec<_> =
-            values.iter().copied().enumerate().filter(|&(i, _)| design.places[i][0] + design.places[i][2] > -0.3).collect();
+        let half: Vec<_> = values
+            .iter()
+            .copied()
+            .enumerate()
+            .filter(|&(i, _)| design.places[i][0] + design.places[i][2] > -0.3)
+            .collect();
         assert!(half.len() < values.len() - 20);
         let partial = design.fit_some(&half).expect("enough");
         for place in &design.tests {
@@ -242,7 +246,8 @@ mod tests {
         let design = Design::get();
         let factor = |x: &Local| -> f64 {
             let at = terms(x);
-            let weight = |column: &[f64; TERMS]| column.iter().zip(&at).map(|(c, t)| c * t).sum::<f64>().abs();
+            let weight =
+                |column: &[f64; TERMS]| column.iter().zip(&at).map(|(c, t)| c * t).sum::<f64>().abs();
             design.solution.iter().map(weight).sum()
         };
         let worst = design.tests.iter().map(factor).fold(0.0, f64::max);

@@ -9,8 +9,9 @@ use crate::geometry::Segment;
 use crate::linespace::{LineFrame, squared_span};
 use crate::ritree::{Fit, Fitted, Place, TreeShape};
 
-/// The largest cells are of a level between these: 3/4 to 3/64 of the body's box wide.
-const LEVELS: std::ops::Range<u32> = 2..6;
+/// The largest cells are of a level between these: 3/8 to 3/32 of the body's box wide. In larger ones, few lines hit in too
+/// many cells.
+const LEVELS: std::ops::Range<u32> = 3..6;
 
 /// A level's cells are the largest if those of the next would leave no more than this share of the hits less to be traced.
 const WORTH_A_LEVEL: f64 = 0.02;
@@ -38,7 +39,8 @@ impl<'a> SquaredChord<'a> {
     /// Looks at a few cells to find the noise of facets, and the largest cells that are worth a fit.
     pub(super) fn with_first_level(mut self) -> Self {
         /// Lines through the body, somewhat off its middle.
-        const PROBES: [[f64; 4]; 3] = [[0.3, 0.4, 0.35, 0.6], [0.63, 0.52, 0.44, 0.71], [0.4, 0.7, 0.69, 0.46]];
+        const PROBES: [[f64; 4]; 3] =
+            [[0.3, 0.4, 0.35, 0.6], [0.63, 0.52, 0.44, 0.71], [0.4, 0.7, 0.69, 0.46]];
         let look = |axis: usize, level: u32| {
             let parts = 0..4 * level;
             let root = Place::root(LineFrame::pair(axis));
@@ -47,7 +49,9 @@ impl<'a> SquaredChord<'a> {
         let noise = look(0, NOISE_LEVEL).and_then(|look| look.fit).map_or(0.0, |fit| fit.error);
         // F is spread evenly over lines through a ball, from 0 to about 1 there.
         let traced = |level: u32| -> f64 {
-            let of_axis = |axis: usize| look(axis, level).and_then(|look| look.fit).map_or(1.0, |fit| fit.threshold.min(1.0));
+            let of_axis = |axis: usize| {
+                look(axis, level).and_then(|look| look.fit).map_or(1.0, |fit| fit.threshold.min(1.0))
+            };
             (0..3).map(of_axis).sum::<f64>() / 3.0
         };
         let (mut level, mut here) = (LEVELS.start, traced(LEVELS.start));
@@ -79,7 +83,8 @@ impl<'a> SquaredChord<'a> {
             samples.take(&design.places[FIT_LINES..]);
         }
         samples.take(&design.tests);
-        (!samples.hits.is_empty()).then(|| Look { fit: self.fit_of(place, &samples, is_complete), samples: samples.count as u64 })
+        (!samples.hits.is_empty())
+            .then(|| Look { fit: self.fit_of(place, &samples, is_complete), samples: samples.count as u64 })
     }
 
     fn fit_of(&self, place: &Place, samples: &Samples, is_complete: bool) -> Option<CellFit> {
@@ -100,7 +105,8 @@ impl<'a> SquaredChord<'a> {
         let of_misses = samples.misses.iter().map(|miss| cubic.at(&local(miss.line)) + miss.quartic);
         let error = of_hits.chain(of_misses).fold(0.0, f64::max);
         let axis = place.pair.axes()[0];
-        let factor = (0..16).map(|bits| self.length_factor(axis, place.cell.corner(bits))).fold(0.0, f64::max);
+        let factor =
+            (0..16).map(|bits| self.length_factor(axis, place.cell.corner(bits))).fold(0.0, f64::max);
         let threshold = |error: f64| (SAFETY * error * factor / (2.0 * self.tolerance_mm)).powi(2);
         let traced = |threshold: f64| {
             let below = samples.hits.iter().filter(|hit| hit.f < threshold).count();
@@ -240,7 +246,14 @@ const OVERHANG: f64 = 0.01;
 
 impl<'f, 'a> Samples<'f, 'a> {
     fn new(fitter: &'f SquaredChord<'a>, place: &'f Place) -> Self {
-        Self { fitter, place, locals: Vec::with_capacity(160), hits: Vec::with_capacity(160), misses: Vec::new(), count: 0 }
+        Self {
+            fitter,
+            place,
+            locals: Vec::with_capacity(160),
+            hits: Vec::with_capacity(160),
+            misses: Vec::new(),
+            count: 0,
+        }
     }
 
     fn local(&self, line: usize) -> &'static Local {
@@ -249,7 +262,8 @@ impl<'f, 'a> Samples<'f, 'a> {
 
     fn take(&mut self, places: &'static [Local]) {
         let axis = self.place.pair.axes()[0];
-        let (centre, half) = (self.place.cell.centre(), 0.5 * (self.place.cell.high[0] - self.place.cell.low[0]));
+        let (centre, half) =
+            (self.place.cell.centre(), 0.5 * (self.place.cell.high[0] - self.place.cell.low[0]));
         let stuv = |place: &Local| -> [f64; 4] { std::array::from_fn(|a| centre[a] + half * place[a]) };
         let mut rays = Vec::with_capacity(places.len());
         for place in places {

@@ -148,7 +148,15 @@ impl<'a> ImageChords<'a> {
                     if let (Some(middles), Some(middle)) = (&mut found.middles, &model.middle) {
                         let middle = |stuv: &[f64; 4]| middle.at(&model.local(stuv));
                         let on_image = OnImage::new(middle, 0.0, &forms, origin);
-                        self.find_middles(&on_image, axis, &forms.denominator, origin, pixels, region, middles);
+                        self.find_middles(
+                            &on_image,
+                            axis,
+                            &forms.denominator,
+                            origin,
+                            pixels,
+                            region,
+                            middles,
+                        );
                     }
                 }
             });

@@ -167,7 +167,13 @@ impl<'a> SquaredChord<'a> {
     }
 
     /// As [`known`](Self::known), as a part of the line; of no length if it misses. `None` if the line is to be traced.
-    pub fn chord(&self, leaf: &ChordLeaf, line: &Line, pair: PlanePair, stuv: &[f64; 4]) -> Option<Option<Interval>> {
+    pub fn chord(
+        &self,
+        leaf: &ChordLeaf,
+        line: &Line,
+        pair: PlanePair,
+        stuv: &[f64; 4],
+    ) -> Option<Option<Interval>> {
         match self.known(leaf, line, pair, stuv) {
             Known::Miss => Some(None),
             Known::Nothing => None,

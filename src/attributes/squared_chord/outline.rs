@@ -64,7 +64,8 @@ fn shares(surface: &ClosedMesh, grid: &RayGrid) -> [f64; 2] {
     };
     let bounds = surface.bounds();
     let scale = 1.0 / normal.dot(path);
-    let (middle, half) = ((bounds.centre() - from).dot(normal) * scale, 0.5 * bounds.size().dot((scale * normal).abs()));
+    let (middle, half) =
+        ((bounds.centre() - from).dot(normal) * scale, 0.5 * bounds.size().dot((scale * normal).abs()));
     [middle - half, middle + half]
 }
 

@@ -3,8 +3,8 @@
 use super::Rays;
 use crate::exact::{Body, Engine, Lengths, Record, Spans};
 use crate::geometry::{Interval, Segment};
-use crate::modes::project::Method;
 use crate::modes::project::forest::{Forest, Grove, holds_box};
+use crate::modes::project::{Interpolation, Method};
 
 /// A way to find the lengths of rays in bodies.
 pub trait Witness: Sync {
@@ -78,7 +78,7 @@ impl Witness for MethodWitness {
                 parts
             }
             Method::RiTree(settings) => {
-                let forest = Forest::new(vec![body], settings);
+                let forest = Forest::new(vec![body], settings, true);
                 interpolate_all(&forest, body, rays)
             }
         }
@@ -89,7 +89,7 @@ impl Witness for MethodWitness {
             Method::Exact(_) => sets.iter().map(|rays| self.parts(body, rays)).collect(),
             // One tree for all: what becomes of a cell does not depend on who asks.
             Method::RiTree(settings) => {
-                let forest = Forest::new(vec![body], settings);
+                let forest = Forest::new(vec![body], settings, true);
                 sets.iter().map(|rays| interpolate_all(&forest, body, rays)).collect()
             }
         }
@@ -109,8 +109,13 @@ impl Witness for MethodWitness {
     /// middles, and is held here to the mean over all rays.
     fn promised_error_mm(&self, body: &Body) -> f64 {
         match self.method {
-            Method::RiTree(settings) if Forest::new(vec![body], settings).grows(0) => {
-                settings.parameters.distance_threshold * 0.5 * body.bounds().size().max_element()
+            Method::RiTree(settings) if Forest::new(vec![body], settings, true).grows(0) => {
+                match settings.interpolation {
+                    Interpolation::Quadrilinear { parameters } => {
+                        parameters.distance_threshold * 0.5 * body.bounds().size().max_element()
+                    }
+                    Interpolation::SquaredChord { tolerance_mm } => tolerance_mm,
+                }
             }
             _ => 0.0,
         }

@@ -8,6 +8,7 @@ use super::plot::{Form, Plot, Series, decade_name};
 use super::short;
 use crate::modes::audit::{AuditReport, Bar, KindFigures, OrganFigures};
 use crate::modes::figures::Figures;
+use crate::modes::project::Interpolation;
 
 const STYLE: &str = include_str!("page.css");
 
@@ -49,11 +50,14 @@ pub fn page(report: &AuditReport, panels: &[Panel]) -> String {
 /// What was compared with what.
 fn what(report: &AuditReport) -> String {
     let seed = report.rays.seed.map(|seed| format!(", seed {seed}")).unwrap_or_default();
-    let trees = report.trees.map_or(String::new(), |trees| {
-        format!(
-            " (distance threshold {}, depth {} at most)",
-            trees.parameters.distance_threshold, trees.parameters.max_depth
-        )
+    let trees = report.trees.map_or(String::new(), |trees| match trees.interpolation {
+        Interpolation::Quadrilinear { parameters } => format!(
+            " (quadrilinear, distance threshold {}, depth {} at most)",
+            parameters.distance_threshold, parameters.max_depth
+        ),
+        Interpolation::SquaredChord { tolerance_mm } => {
+            format!(" (squared chords, tolerance {tolerance_mm} mm)")
+        }
     });
     format!(
         "<p class=\"lead\"><b>{}</b>{trees} against <b>{}</b>, along {}{seed}: {} rays. Lengths are in mm; \
