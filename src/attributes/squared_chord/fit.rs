@@ -28,9 +28,6 @@ const SAFETY: f64 = 1.5;
 /// What halving a cell divides the error of a cubic by: 2⁴ less what facets and outlines leave.
 const GAIN_OF_SPLIT: f64 = 12.0;
 
-/// The level of cells whose error is the facets' alone.
-const NOISE_LEVEL: u32 = 8;
-
 /// A separation below this, in box units, is not believed: far more than rounding, even of a body a thousand times its size
 /// from the origin.
 const LEAST_SEPARATION: f64 = 1e-9;
@@ -46,13 +43,16 @@ impl<'a> SquaredChord<'a> {
             let root = Place::root(LineFrame::pair(axis));
             self.look_at(&parts.fold(root, |place, _| place.half(place.side_of(&PROBES[axis]))))
         };
-        let noise = look(0, NOISE_LEVEL).and_then(|look| look.fit).map_or(0.0, |fit| fit.error);
+        let mut noise = f64::INFINITY;
         // F is spread evenly over lines through a ball, from 0 to about 1 there.
-        let traced = |level: u32| -> f64 {
-            let of_axis = |axis: usize| {
-                look(axis, level).and_then(|look| look.fit).map_or(1.0, |fit| fit.threshold.min(1.0))
-            };
-            (0..3).map(of_axis).sum::<f64>() / 3.0
+        let mut traced = |level: u32| -> f64 {
+            let fits = (0..3).map(|axis| look(axis, level).and_then(|look| look.fit));
+            let shares = fits.map(|fit| {
+                let fit = fit?;
+                noise = noise.min(fit.error);
+                Some(fit.threshold.min(1.0))
+            });
+            shares.map(|share| share.unwrap_or(1.0)).sum::<f64>() / 3.0
         };
         let (mut level, mut here) = (LEVELS.start, traced(LEVELS.start));
         while level + 1 < LEVELS.end {
@@ -62,7 +62,7 @@ impl<'a> SquaredChord<'a> {
             }
             (level, here) = (level + 1, next);
         }
-        self.noise = noise;
+        self.noise = if noise.is_finite() { noise } else { 0.0 };
         self.first_level = level;
         self
     }

@@ -265,8 +265,12 @@ impl WithSimd for FillFactors<'_> {
 struct OnImage {
     /// Of 1, x, x², x³, y, xy, x²y, y², xy², y³.
     coefficients: [f64; 10],
-    /// G below this is below the leaf's threshold.
+    /// Of F.
     threshold: f64,
+    /// w.
+    denominator: PixelForm,
+    left: f64,
+    side: f64,
 }
 
 /// The ten powers of a cubic in two variables.
@@ -306,10 +310,14 @@ impl OnImage {
         });
         let coefficients =
             from_lattice().each_ref().map(|row| row.iter().zip(&values).map(|(a, b)| a * b).sum());
-        let corners = [(0.0, 0.0), (side, 0.0), (0.0, side), (side, side)];
-        let largest =
-            corners.map(|(c, r)| forms.denominator.at(left + c, top + r)).into_iter().fold(0.0, f64::max);
-        Self { coefficients, threshold: threshold * largest.powi(3) }
+        Self { coefficients, threshold, denominator: forms.denominator, left, side }
+    }
+
+    /// G below this may be below the leaf's threshold in a row: w is affine, and largest at one of the ends.
+    #[inline(always)]
+    fn threshold_of(&self, row: u32) -> f64 {
+        let w = |c: f64| self.denominator.at(c, f64::from(row));
+        self.threshold * w(self.left).max(w(self.left + self.side)).powi(3)
     }
 
     /// The coefficients of a row's cubic in x.
@@ -337,9 +345,9 @@ impl WithSimd for Evaluate<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let [left, top] = self.origin;
-        let threshold = self.on_image.threshold;
         for (row, columns) in self.pixels.iter() {
             let [g0, g1, g2, g3] = self.on_image.of_row(f64::from(row - top) * STEP);
+            let threshold = self.on_image.threshold_of(row);
             let first = (columns.start - left) as usize;
             let factors = &self.factors.of_rows[(row - top) as usize][first..first + columns.len()];
             let lengths = &mut self.lengths[place_in(self.region, row, &columns)];

@@ -111,12 +111,13 @@ impl<'a> SquaredChord<'a> {
     /// convex, or too flat to have a frame.
     pub fn new(body: &'a Body, tolerance_mm: f64, wants_places: bool) -> Option<Self> {
         let (middle, to_ball) = body.walker()?.ball_frame();
+        // The ball's radius is 1: a hundredth more does no harm.
         let reach = |axis: DVec3| {
             let normal = to_ball.transpose() * axis;
-            body.surface().farthest_vertex(normal, middle, f64::NEG_INFINITY).map(|(height, _)| height)
+            body.surface().height_bound(normal, middle, 0.0, 0.01).0
         };
-        let high = DVec3::new(reach(DVec3::X)?, reach(DVec3::Y)?, reach(DVec3::Z)?);
-        let low = -DVec3::new(reach(-DVec3::X)?, reach(-DVec3::Y)?, reach(-DVec3::Z)?);
+        let high = DVec3::new(reach(DVec3::X), reach(DVec3::Y), reach(DVec3::Z));
+        let low = -DVec3::new(reach(-DVec3::X), reach(-DVec3::Y), reach(-DVec3::Z));
         let frame = LineFrame::new(middle, to_ball, low, high)?;
         let engine = body.engine_for_rays();
         let fitter = Self { body, engine, frame, tolerance_mm, wants_places, first_level: 0, noise: 0.0 };

@@ -9,11 +9,11 @@ use glam::DVec3;
 
 use crate::geometry::{ClosedMesh, RayGrid, Upstream};
 
-/// Sides of the polygon. A regular one of 32 sides is 0.3 % larger than the ellipse in it.
-const SIDES: usize = 32;
+/// Sides of the polygon. A regular one of 24 sides is 0.6 % larger than the ellipse in it.
+const SIDES: usize = 24;
 
 /// Sides may lie so far out, pixels; no closer search is made.
-const SLACK_PIXELS: f64 = 0.1;
+const SLACK_PIXELS: f64 = 0.25;
 
 /// More than rounding can put a vertex off its place, pixels.
 const ROUNDING_PIXELS: f64 = 1e-6;
