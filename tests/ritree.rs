@@ -41,21 +41,27 @@ fn bits(projection: &Projection) -> Vec<u32> {
 
 #[test]
 fn images_are_the_same_bits_for_any_threads_order_and_cache_cold_or_warm() {
+    let squared = |cache_bytes| TreeSettings { cache_bytes, ..TreeSettings::default() };
     let scene = cone_scene(100);
-    let reference = projector(&scene, settings(100_000_000));
-    let expected = [0, 1].map(|i| bits(&view(&reference, &scene, i)));
+    assert_the_same_bits(&scene, settings);
+    assert_the_same_bits(&scene, squared);
+}
+
+fn assert_the_same_bits(scene: &Scene, settings: impl Fn(usize) -> TreeSettings + Sync) {
+    let reference = projector(scene, settings(100_000_000));
+    let expected = [0, 1].map(|i| bits(&view(&reference, scene, i)));
     assert_eq!(
-        [1, 0].map(|i| bits(&view(&reference, &scene, i))),
+        [1, 0].map(|i| bits(&view(&reference, scene, i))),
         [expected[1].clone(), expected[0].clone()],
         "warm"
     );
     for (threads, cache_bytes) in [(1, 100_000_000), (2, 200_000), (8, 200_000), (2, 0), (8, 20_000)] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         pool.install(|| {
-            let projector = projector(&scene, settings(cache_bytes));
+            let projector = projector(scene, settings(cache_bytes));
             for i in [1, 0] {
                 assert_eq!(
-                    bits(&view(&projector, &scene, i)),
+                    bits(&view(&projector, scene, i)),
                     expected[i],
                     "{threads} threads, {cache_bytes} bytes"
                 );
@@ -145,4 +151,21 @@ fn a_source_inside_the_box_is_traced() {
     let exact = Projector::new(&scene, LENGTHS, None, Method::Exact(None)).expect("a projector");
     assert_eq!(near.own_length_mm(0), view(&exact, &scene, 0).own_length_mm(0));
     assert!(near.queries().traced_source_or_target_inside > 0);
+}
+
+#[test]
+fn squared_chords_keep_to_their_tolerance() {
+    let scene = cone_scene(200);
+    let views = scene.beam.views().expect("views");
+    for tolerance_mm in [2.0, 0.5, 0.1] {
+        let interpolation = Interpolation::SquaredChord { tolerance_mm };
+        let projector = projector(&scene, TreeSettings { interpolation, ..TreeSettings::default() });
+        let projection = view(&projector, &scene, 0);
+        let found = projection.found();
+        let count = |kind| found.iter().filter(|&&found| found == kind).count();
+        assert!(count(Found::Interpolated) > 3 * count(Found::Traced), "{tolerance_mm} mm");
+        let errors = projector.spot_check(&views, 20_000, 3).expect("trees");
+        assert!(errors.compared > 2_000);
+        assert!(errors.p999 <= tolerance_mm && errors.max <= 5.0 * tolerance_mm, "{errors:?}");
+    }
 }

@@ -30,13 +30,21 @@ impl LineFrame {
     }
 
     /// A point of the world, mm, in the frame.
+    #[inline]
     pub fn point(&self, p: DVec3) -> DVec3 {
         self.to_unit.transform_point3(p)
     }
 
     /// A vector of the world, mm, in the frame.
+    #[inline]
     pub fn vector(&self, v: DVec3) -> DVec3 {
         self.to_unit.transform_vector3(v)
+    }
+
+    /// One component of a vector of the world, mm, in the frame.
+    #[inline]
+    pub fn advance(&self, axis: usize, v: DVec3) -> f64 {
+        self.to_unit.matrix3.row(axis).dot(v)
     }
 
     /// A point of the frame in the world, mm.
@@ -50,12 +58,14 @@ impl LineFrame {
     }
 
     /// The axis along which a direction of the frame is dominant; equal components go to the earlier axis.
+    #[inline]
     pub fn dominant(d: DVec3) -> usize {
         let a = d.abs();
         if a.x >= a.y && a.x >= a.z { 0 } else { 1 + usize::from(a.z > a.y) }
     }
 
     /// The plane pair of an axis.
+    #[inline]
     pub fn pair(axis: usize) -> PlanePair {
         PlanePair::ALL[2 * axis]
     }

@@ -54,7 +54,7 @@ impl<'a> ImageChords<'a> {
     /// Makes the body of `fitter` ready for `grid`'s rays. `None` if it does not lie wholly between where rays start and where
     /// they end.
     pub fn new(fitter: &SquaredChord<'a>, grid: &RayGrid) -> Option<Self> {
-        let rows = rows_within(fitter.body.surface(), grid)?;
+        let rows = rows_within(fitter.body.surface(), fitter.body.walker()?, grid)?;
         let lines = ImageLines::new(&fitter.frame, grid);
         let exact = fitter.body.view(grid, Some(Engine::Walk));
         Some(Self { lines, rows, exact })
@@ -74,7 +74,6 @@ impl<'a> ImageChords<'a> {
         cache: &Cache,
         found: &mut ImageLengths,
     ) {
-        found.lengths.fill(0.0);
         for top in aligned(&region.rows) {
             for left in aligned(&region.columns) {
                 let block = Region {
@@ -112,6 +111,10 @@ impl<'a> ImageChords<'a> {
         cache: &Cache,
         found: &mut ImageLengths,
     ) {
+        // Block by block, so that what is filled is still near when it is written to.
+        for row in block.rows.clone() {
+            found.lengths[place_in(region, row, &block.columns)].fill(0.0);
+        }
         let pixels = Runs::of_rows(block, |row| self.rows[row as usize].clone());
         if pixels.iter().next().is_none() {
             return;

@@ -149,9 +149,10 @@ impl<'a> SquaredChord<'a> {
                 let f = model.at(stuv);
                 // Written so that NaN is traced.
                 if f >= model.threshold {
-                    let [k, ..] = pair.axes();
                     // |d in mm| is 1 over what the line's direction advances from plane to plane.
-                    Known::Length(f.sqrt() / (squared_span(stuv) * self.frame.vector(line.dir())[k].abs()))
+                    let [k, ..] = pair.axes();
+                    let advance = self.frame.advance(k, line.dir()).abs();
+                    Known::Length(f.sqrt() / (squared_span(stuv) * advance))
                 } else {
                     Known::Nothing
                 }

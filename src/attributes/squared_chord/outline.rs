@@ -7,10 +7,14 @@ use std::ops::Range;
 
 use glam::DVec3;
 
+use crate::exact::walk::Walker;
 use crate::geometry::{ClosedMesh, RayGrid, Upstream};
 
 /// Sides of the polygon. A regular one of 24 sides is 0.6 % larger than the ellipse in it.
 const SIDES: usize = 24;
+
+/// Vertices that are looked up before any is searched for.
+const GUESSES: usize = 3;
 
 /// Sides may lie so far out, pixels; no closer search is made.
 const SLACK_PIXELS: f64 = 0.25;
@@ -71,7 +75,7 @@ fn shares(surface: &ClosedMesh, grid: &RayGrid) -> [f64; 2] {
 
 /// The pixels of each row that the body inside a convex surface may be seen at; all others miss, proved. `None` if the body
 /// does not lie wholly between where rays start and where they end.
-pub fn rows_within(surface: &ClosedMesh, grid: &RayGrid) -> Option<Vec<Range<u32>>> {
+pub fn rows_within(surface: &ClosedMesh, walker: &Walker, grid: &RayGrid) -> Option<Vec<Range<u32>>> {
     let [nearest, farthest] = shares(surface, grid);
     // Written so that NaN is not within.
     let is_within = nearest > 1e-9 && farthest < 1.0;
@@ -89,6 +93,9 @@ pub fn rows_within(surface: &ClosedMesh, grid: &RayGrid) -> Option<Vec<Range<u32
         let along = cos * sight.column + sin * sight.row;
         let slack = SLACK_PIXELS * least_depth;
         let mut most = sight.place(touching, along);
+        for _ in 0..GUESSES {
+            most = most.max(sight.place(walker.vertex_towards(along - most * sight.depth), along));
+        }
         loop {
             let normal = along - most * sight.depth;
             let base = most * sight.constant_depth;

@@ -285,7 +285,8 @@ fn single_lines_and_threads_get_the_same_bits() {
 fn pixels_beyond_the_outline_miss_and_few_within_do() {
     for (name, body) in shapes() {
         for grid in grids(200) {
-            let rows = outline::rows_within(body.surface(), &grid).expect("between source and pixels");
+            let rows = outline::rows_within(body.surface(), body.walker().expect("convex"), &grid)
+                .expect("between source and pixels");
             let mut lengths = vec![0.0; grid.whole().pixels()];
             body.view(&grid, None).trace(&grid.whole(), &mut Lengths(&mut lengths));
             let (mut within, mut hits) = (0, 0);

@@ -126,6 +126,11 @@ impl Walker {
         self.seeds.ball_frame()
     }
 
+    /// A vertex about as far along `normal` as any: of an ellipsoid, one near the farthest.
+    pub fn vertex_towards(&self, normal: DVec3) -> DVec3 {
+        self.vertices[self.faces[self.seeds.facing(normal) as usize].corners[0] as usize]
+    }
+
     /// Whether the line from `origin` along `dir`, mm, passes so far by that it surely misses: quicker than a walk.
     #[inline]
     pub fn passes_by(&self, origin: DVec3, dir: DVec3) -> bool {

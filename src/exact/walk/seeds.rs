@@ -130,6 +130,11 @@ impl SeedTable {
         foot.length_squared() > self.holding_squared + PASSING_BY * o.length_squared()
     }
 
+    /// The face at which the ball's plane across `normal` would touch.
+    pub fn facing(&self, normal: DVec3) -> u32 {
+        self.cell(self.to_ball.inverse().transpose() * normal).face
+    }
+
     /// A face that looks along `dir`.
     pub fn towards(&self, walker: &Walker, dir: DVec3) -> u32 {
         let face = self.cell(self.to_ball * dir).face;
