@@ -13,6 +13,9 @@ use crate::ritree::{Fit, Fitted, Place, TreeShape};
 /// many cells.
 const LEVELS: std::ops::Range<u32> = 3..6;
 
+/// Where more than this share of lines would be traced in the smallest cells, all are, without a look.
+const HOPELESS: f64 = 0.8;
+
 /// A level's cells are the largest if those of the next would leave no more than this share of the hits less to be traced.
 const WORTH_A_LEVEL: f64 = 0.02;
 
@@ -64,6 +67,10 @@ impl<'a> SquaredChord<'a> {
         }
         self.noise = if noise.is_finite() { noise } else { 0.0 };
         self.first_level = level;
+        if here > HOPELESS {
+            // Nothing would come of fits: one cell says so for all.
+            (self.first_level, self.is_hopeless) = (0, true);
+        }
         self
     }
 
@@ -158,6 +165,9 @@ impl Fit for SquaredChord<'_> {
     }
 
     fn fit(&self, place: &Place) -> Fitted<ChordLeaf> {
+        if self.is_hopeless {
+            return Fitted { samples: 0, leaf: Some(ChordLeaf::Traced) };
+        }
         let all = (FIT_LINES + super::cubic::MORE_LINES + TEST_LINES) as u64;
         let Some(look) = self.look_at(place) else {
             let leaf = if self.is_certainly_empty(place) { ChordLeaf::Empty } else { ChordLeaf::Traced };

@@ -48,6 +48,8 @@ pub struct SquaredChord<'a> {
     first_level: u32,
     /// The error of F that facets make, which no split mends.
     noise: f64,
+    /// Whether facets or edges leave next to nothing to be known within the tolerance.
+    is_hopeless: bool,
 }
 
 /// What answers the lines of a final cell.
@@ -120,7 +122,16 @@ impl<'a> SquaredChord<'a> {
         let low = -DVec3::new(reach(-DVec3::X), reach(-DVec3::Y), reach(-DVec3::Z));
         let frame = LineFrame::new(middle, to_ball, low, high)?;
         let engine = body.engine_for_rays();
-        let fitter = Self { body, engine, frame, tolerance_mm, wants_places, first_level: 0, noise: 0.0 };
+        let fitter = Self {
+            body,
+            engine,
+            frame,
+            tolerance_mm,
+            wants_places,
+            first_level: 0,
+            noise: 0.0,
+            is_hopeless: false,
+        };
         Some(fitter.with_first_level())
     }
 

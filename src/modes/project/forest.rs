@@ -191,6 +191,8 @@ impl<'a> Forest<'a> {
             Interpolation::SquaredChord { tolerance_mm } => {
                 SquaredChord::new(body, tolerance_mm, self.wants_places)
                     .map(|chords| OrganTree::SquaredChord(FittedTree::new(chords)))
+                    // A body too flat for a frame is still not lost: nothing of it is interpolated.
+                    .or_else(|| quadrilinear(Parameters { max_depth: 0, ..Parameters::default() }))
             }
         }
     }
