@@ -406,6 +406,33 @@ fn ritrees_report_what_they_did_and_draw_their_map() {
     }
 }
 
+#[test]
+fn a_tolerance_in_millimetres_is_kept_to_and_thresholds_are_of_the_papers_interpolation() {
+    let folder = folder();
+    let run = |more: &[&str]| {
+        let args = ["project", "balls.toml", "--json", "--write", "lengths", "--size", "200x200"];
+        chordfield(folder.path(), &[&args[..], more].concat())
+    };
+    for tolerance in ["2mm", "2"] {
+        let trees = &summary(&run(&["--tolerance", tolerance]))["ritree"];
+        assert_eq!(trees["settings"]["interpolation"], "squared-chord");
+        assert_eq!(trees["settings"]["tolerance_mm"], 2.0);
+        let error = |key: &str| trees["sampled_error_mm"][key].as_f64().expect("a figure");
+        assert!(error("p999") <= 2.0 && error("max") <= 10.0, "{trees}");
+    }
+    let paper = summary(&run(&["--interpolation", "quadrilinear"]));
+    assert_eq!(paper["ritree"]["settings"]["interpolation"], "quadrilinear");
+    for bad in [
+        ["--tolerance", "1mm", "--max-depth", "20"],
+        ["--tolerance", "1mm", "--interpolation", "quadrilinear"],
+        ["--distance-threshold", "0.1", "--interpolation", "squared-chord"],
+        ["--tolerance", "0mm", "--interpolation", "squared-chord"],
+        ["--tolerance", "1cm", "--interpolation", "squared-chord"],
+    ] {
+        assert_eq!(run(&bad).status.code(), Some(2), "{bad:?}");
+    }
+}
+
 /// What a projection may hold beside cache, images and meshes: the program itself, spectra and tables, the stacks and
 /// scratch of its threads.
 #[cfg(target_os = "linux")]

@@ -47,8 +47,8 @@ pub fn terms(x: &Local) -> [f64; TERMS] {
         terms[1 + i] = x[i];
         for j in i..4 {
             terms[quadratic] = x[i] * x[j];
-            for k in j..4 {
-                terms[cubic] = terms[quadratic] * x[k];
+            for x in &x[j..] {
+                terms[cubic] = terms[quadratic] * x;
                 cubic += 1;
             }
             quadratic += 1;

@@ -362,16 +362,17 @@ impl WithSimd for Evaluate<'_> {
             for (i, (length, factor)) in lengths.iter_mut().zip(factors).enumerate() {
                 let g = g_at(i);
                 // Written so that NaN is traced.
-                doubtful += u64::from(!(g >= threshold));
+                let is_known = g >= threshold;
+                doubtful += u64::from(!is_known);
                 *length = (g * factor).sqrt();
             }
             if doubtful > 0 {
                 let mut start = None;
                 for i in 0..=columns.len() {
-                    let is_doubtful = i < columns.len() && !(g_at(i) >= threshold);
-                    match (start, is_doubtful) {
-                        (None, true) => start = Some(i),
-                        (Some(from), false) => {
+                    let is_known = i == columns.len() || g_at(i) >= threshold;
+                    match (start, is_known) {
+                        (None, false) => start = Some(i),
+                        (Some(from), true) => {
                             let at = |i: usize| columns.start + i as u32;
                             self.open.push((row, at(from)..at(i)));
                             start = None;
