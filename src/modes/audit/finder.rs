@@ -45,6 +45,11 @@ pub(super) trait Finder: Sync {
     fn needs_image(&self, _organ: usize) -> bool {
         false
     }
+
+    /// Whether an organ's rays may be interpolated.
+    fn is_in_tree(&self, organ: usize) -> bool {
+        !self.needs_image(organ)
+    }
 }
 
 /// A [`Finder`] at work.
@@ -94,6 +99,10 @@ impl Finder for ByMethod<'_> {
 
     fn needs_image(&self, organ: usize) -> bool {
         !self.grows(organ) || self.forest.as_ref().is_some_and(Forest::finds_runs)
+    }
+
+    fn is_in_tree(&self, organ: usize) -> bool {
+        self.grows(organ)
     }
 }
 
