@@ -4,7 +4,7 @@ use super::Rays;
 use crate::exact::{Body, Engine, Lengths, Record, Spans};
 use crate::geometry::{Interval, Segment};
 use crate::modes::project::forest::{Forest, Grove, holds_box};
-use crate::modes::project::{Interpolation, Method};
+use crate::modes::project::{Interpolation, Method, TreeSettings};
 
 /// A way to find the lengths of rays in bodies.
 pub trait Witness: Sync {
@@ -28,6 +28,12 @@ pub trait Witness: Sync {
     /// for rounding.
     fn promised_error_mm(&self, _body: &Body) -> f64 {
         0.0
+    }
+
+    /// As [`lengths`](Self::lengths), of a body `factor` times as large as one asked for before: what the witness is told in mm
+    /// is told in as many times more.
+    fn lengths_at_scale(&self, _factor: f64, body: &Body, rays: &Rays) -> Vec<f64> {
+        self.lengths(body, rays)
     }
 
     /// Whether it finds the lengths of lists of rays in `body`, not of images only.
@@ -119,6 +125,18 @@ impl Witness for MethodWitness {
             }
             _ => 0.0,
         }
+    }
+
+    fn lengths_at_scale(&self, factor: f64, body: &Body, rays: &Rays) -> Vec<f64> {
+        let mut method = self.method;
+        if let Method::RiTree(TreeSettings {
+            interpolation: Interpolation::SquaredChord { tolerance_mm },
+            ..
+        }) = &mut method
+        {
+            *tolerance_mm *= factor;
+        }
+        Self { method }.lengths(body, rays)
     }
 
     fn takes_lists(&self, _: &Body) -> bool {
