@@ -19,8 +19,8 @@ const HOPELESS: f64 = 0.8;
 /// A level's cells are the largest if those of the next would leave no more than this share of the hits less to be traced.
 const WORTH_A_LEVEL: f64 = 0.02;
 
-/// Cells are split no more than so many levels below the first.
-const MOST_SPLITS: u32 = 2;
+/// Cells are split no more than so many levels below the first: more of them would lie along edges and be traced all the same.
+const MOST_SPLITS: u32 = 1;
 
 /// A cell is split if that would spare this share of its hits to be traced.
 const WORTH_SPLITTING: f64 = 0.15;
@@ -107,9 +107,9 @@ impl<'a> SquaredChord<'a> {
         };
         let cubic = cubic_of(|hit| hit.f - hit.quartic)?;
         let local = |line: usize| samples.local(line);
-        let of_hits = samples.hits.iter().map(|hit| (cubic.at(&local(hit.line)) + hit.quartic - hit.f).abs());
+        let of_hits = samples.hits.iter().map(|hit| (cubic.at(local(hit.line)) + hit.quartic - hit.f).abs());
         // A line that misses has no F; where the model has one, it is in error.
-        let of_misses = samples.misses.iter().map(|miss| cubic.at(&local(miss.line)) + miss.quartic);
+        let of_misses = samples.misses.iter().map(|miss| cubic.at(local(miss.line)) + miss.quartic);
         let error = of_hits.chain(of_misses).fold(0.0, f64::max);
         let axis = place.pair.axes()[0];
         let factor =
@@ -126,7 +126,7 @@ impl<'a> SquaredChord<'a> {
         if self.wants_places {
             let middle = cubic_of(|hit| hit.middle)?;
             let known = samples.hits.iter().filter(|hit| hit.f >= threshold);
-            let off = known.map(|hit| (middle.at(&local(hit.line)) - hit.middle).abs()).fold(0.0, f64::max);
+            let off = known.map(|hit| (middle.at(local(hit.line)) - hit.middle).abs()).fold(0.0, f64::max);
             if SAFETY * off * factor > self.tolerance_mm {
                 // No chord is known whose place is not.
                 (fit.threshold, fit.gain_of_split) = (f64::INFINITY, 1.0);
