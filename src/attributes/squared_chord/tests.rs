@@ -296,7 +296,8 @@ fn pixels_beyond_the_outline_miss_and_few_within_do() {
                 within += usize::from(is_within);
                 hits += usize::from(lengths[i] > 0.0);
             }
-            assert!(within <= hits + hits / 10 + 1000, "{name}: {within} pixels for {hits} hits");
+            // A polygon of given directions is wide about a needle askew.
+            assert!(within <= hits + hits / 10 + 2500, "{name}: {within} pixels for {hits} hits");
         }
     }
 }
