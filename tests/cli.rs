@@ -508,7 +508,7 @@ fn an_audit_writes_a_page_that_needs_nothing_else_and_its_figures_and_is_repeata
 fn a_broken_limit_exits_1_and_names_the_worst_ray_which_its_command_finds_again() {
     let folder = folder();
     for rays in [&["--gantry", "30"][..], &["--rays", "2e4", "--seed", "7"]] {
-        let args = [&["audit", "balls.toml", "--json", "--limit-mm", "0.5"], rays].concat();
+        let args = [&["audit", "balls.toml", "--json", "--limit-mm", "0.001"], rays].concat();
         let run = chordfield(folder.path(), &args);
         assert_eq!(run.status.code(), Some(1), "{}", err(&run));
         let report: serde_json::Value = serde_json::from_slice(&run.stdout).expect("only JSON");
@@ -516,7 +516,7 @@ fn a_broken_limit_exits_1_and_names_the_worst_ray_which_its_command_finds_again(
         let said = String::from_utf8_lossy(&run.stderr).into_owned();
         assert_eq!(said.lines().count(), 1, "{said}");
         let command = worst["reproduce"].as_str().expect("a command");
-        assert!(said.contains(command) && said.contains("limit of 0.5 mm"), "{said}");
+        assert!(said.contains(command) && said.contains("limit of 0.001 mm"), "{said}");
 
         let words: Vec<&str> = command.split(' ').collect();
         assert_eq!(words[0], "chordfield");

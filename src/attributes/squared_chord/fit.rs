@@ -26,7 +26,11 @@ const MOST_SPLITS: u32 = 1;
 const WORTH_SPLITTING: f64 = 0.15;
 
 /// The largest error that samples show, times this, is taken for the bound of all.
-const SAFETY: f64 = 1.5;
+const SAFETY: f64 = 1.75;
+
+/// Of 64 lines and 35 coefficients, a fit takes in so much of the lines' own errors that those left are smaller than others' by
+/// √(1 − 35/64).
+const OF_FIT: f64 = 1.5;
 
 /// What halving a cell divides the error of a cubic by: 2⁴ less what facets and outlines leave.
 const GAIN_OF_SPLIT: f64 = 12.0;
@@ -107,7 +111,11 @@ impl<'a> SquaredChord<'a> {
         };
         let cubic = cubic_of(|hit| hit.f - hit.quartic)?;
         let local = |line: usize| samples.local(line);
-        let of_hits = samples.hits.iter().map(|hit| (cubic.at(local(hit.line)) + hit.quartic - hit.f).abs());
+        let last_of_fit = of_fit.last().map_or(0, |hit| hit.line);
+        let of_hits = samples.hits.iter().map(|hit| {
+            let off = (cubic.at(local(hit.line)) + hit.quartic - hit.f).abs();
+            if hit.line <= last_of_fit { OF_FIT * off } else { off }
+        });
         // A line that misses has no F; where the model has one, it is in error.
         let of_misses = samples.misses.iter().map(|miss| cubic.at(local(miss.line)) + miss.quartic);
         let error = of_hits.chain(of_misses).fold(0.0, f64::max);
