@@ -8,9 +8,13 @@
 //!      └─────────┘           └─────────┘
 //! ```
 
+mod frame;
+pub mod image;
+
 use glam::DVec3;
 
 use crate::geometry::{Bounds, Line, UnitDir};
+pub use frame::{LineFrame, squared_span};
 
 /// The least and greatest intercept of a line through the box.
 pub const INTERCEPT_RANGE: (f64, f64) = (-1.0, 2.0);

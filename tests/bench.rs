@@ -35,7 +35,7 @@ fn a_curve_is_a_page_plots_and_figures_with_a_recommendation() {
     assert_eq!(report["command"], "chordfield bench curve balls.toml --sizes 32x32,16x16 --rounds 3 -o b");
     assert_eq!((&report["complete"], &report["organs"]), (&true.into(), &2.into()));
     let rows = report["rows"].as_array().expect("rows");
-    assert_eq!(rows.len(), 2 * 10, "ten methods and settings at two sizes");
+    assert_eq!(rows.len(), 2 * 15, "fifteen methods and settings at two sizes");
     assert_eq!(rows[0]["pixels"], serde_json::json!([16, 16]), "the smallest first");
     assert!(rows.iter().all(|row| row["cold"]["seconds"].as_f64().is_some_and(|s| s > 0.0)));
     assert!(rows.iter().any(|row| row["on_cold_front"] == true && row["exact"] == true));
@@ -43,7 +43,7 @@ fn a_curve_is_a_page_plots_and_figures_with_a_recommendation() {
 
     let csv = std::fs::read_to_string(folder.path().join("b/curve.csv")).expect("a table");
     let columns: Vec<usize> = csv.lines().map(|line| line.split(',').count()).collect();
-    assert_eq!(columns, vec![columns[0]; 21], "a head and twenty rows of as many fields");
+    assert_eq!(columns, vec![columns[0]; 31], "a head and thirty rows of as many fields");
     let page = std::fs::read_to_string(folder.path().join("b/curve.html")).expect("a page");
     assert!(page.contains("<svg") && !page.contains("NaN") && !page.contains("src=\"http"));
     let plot = std::fs::read_to_string(folder.path().join("b/curve-warm.svg")).expect("a plot");

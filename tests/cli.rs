@@ -419,6 +419,33 @@ fn ritrees_report_what_they_did_and_draw_their_map() {
     }
 }
 
+#[test]
+fn a_tolerance_in_millimetres_is_kept_to_and_thresholds_are_of_the_papers_interpolation() {
+    let folder = folder();
+    let run = |more: &[&str]| {
+        let args = ["project", "balls.toml", "--json", "--write", "lengths", "--size", "200x200"];
+        chordfield(folder.path(), &[&args[..], more].concat())
+    };
+    for tolerance in ["2mm", "2"] {
+        let trees = &summary(&run(&["--tolerance", tolerance]))["ritree"];
+        assert_eq!(trees["settings"]["interpolation"], "squared-chord");
+        assert_eq!(trees["settings"]["tolerance_mm"], 2.0);
+        let error = |key: &str| trees["sampled_error_mm"][key].as_f64().expect("a figure");
+        assert!(error("p999") <= 2.0 && error("max") <= 10.0, "{trees}");
+    }
+    let paper = summary(&run(&["--interpolation", "quadrilinear"]));
+    assert_eq!(paper["ritree"]["settings"]["interpolation"], "quadrilinear");
+    for bad in [
+        ["--tolerance", "1mm", "--max-depth", "20"],
+        ["--tolerance", "1mm", "--interpolation", "quadrilinear"],
+        ["--distance-threshold", "0.1", "--interpolation", "squared-chord"],
+        ["--tolerance", "0mm", "--interpolation", "squared-chord"],
+        ["--tolerance", "1cm", "--interpolation", "squared-chord"],
+    ] {
+        assert_eq!(run(&bad).status.code(), Some(2), "{bad:?}");
+    }
+}
+
 /// What a projection may hold beside cache, images and meshes: the program itself, spectra and tables, the stacks and
 /// scratch of its threads.
 #[cfg(target_os = "linux")]
@@ -494,7 +521,7 @@ fn an_audit_writes_a_page_that_needs_nothing_else_and_its_figures_and_is_repeata
 fn a_broken_limit_exits_1_and_names_the_worst_ray_which_its_command_finds_again() {
     let folder = folder();
     for rays in [&["--gantry", "30"][..], &["--rays", "2e4", "--seed", "7"]] {
-        let args = [&["audit", "balls.toml", "--json", "--limit-mm", "0.5"], rays].concat();
+        let args = [&["audit", "balls.toml", "--json", "--limit-mm", "0.001"], rays].concat();
         let run = chordfield(folder.path(), &args);
         assert_eq!(run.status.code(), Some(1), "{}", err(&run));
         let report: serde_json::Value = serde_json::from_slice(&run.stdout).expect("only JSON");
@@ -502,7 +529,7 @@ fn a_broken_limit_exits_1_and_names_the_worst_ray_which_its_command_finds_again(
         let said = String::from_utf8_lossy(&run.stderr).into_owned();
         assert_eq!(said.lines().count(), 1, "{said}");
         let command = worst["reproduce"].as_str().expect("a command");
-        assert!(said.contains(command) && said.contains("limit of 0.5 mm"), "{said}");
+        assert!(said.contains(command) && said.contains("limit of 0.001 mm"), "{said}");
 
         let words: Vec<&str> = command.split(' ').collect();
         assert_eq!(words[0], "chordfield");

@@ -4,7 +4,7 @@ mod common;
 
 use chordfield::linespace::{Cell, LinePoint, PlanePair};
 use chordfield::modes::Control;
-use chordfield::modes::project::{Found, Method, Projection, Projector, TreeSettings, Wanted};
+use chordfield::modes::project::{Found, Interpolation, Method, Projection, Projector, TreeSettings, Wanted};
 use chordfield::ritree::{Attribute, Cache, Parameters, RiTree, oldest_to_keep};
 use chordfield::scene::Scene;
 use common::{nested_balls, scene};
@@ -19,7 +19,8 @@ fn cone_scene(pixels: u32) -> Scene {
 
 fn settings(cache_bytes: usize) -> TreeSettings {
     let parameters = Parameters { distance_threshold: 0.02, max_depth: 20, ..Parameters::default() };
-    TreeSettings { parameters, cache_bytes, ..TreeSettings::default() }
+    let interpolation = Interpolation::Quadrilinear { parameters };
+    TreeSettings { interpolation, cache_bytes, ..TreeSettings::default() }
 }
 
 fn projector(scene: &Scene, settings: TreeSettings) -> Projector<'_> {
@@ -41,21 +42,27 @@ fn bits(projection: &Projection) -> Vec<u32> {
 
 #[test]
 fn images_are_the_same_bits_for_any_threads_order_and_cache_cold_or_warm() {
+    let squared = |cache_bytes| TreeSettings { cache_bytes, ..TreeSettings::default() };
     let scene = cone_scene(100);
-    let reference = projector(&scene, settings(100_000_000));
-    let expected = [0, 1].map(|i| bits(&view(&reference, &scene, i)));
+    assert_the_same_bits(&scene, settings);
+    assert_the_same_bits(&scene, squared);
+}
+
+fn assert_the_same_bits(scene: &Scene, settings: impl Fn(usize) -> TreeSettings + Sync) {
+    let reference = projector(scene, settings(100_000_000));
+    let expected = [0, 1].map(|i| bits(&view(&reference, scene, i)));
     assert_eq!(
-        [1, 0].map(|i| bits(&view(&reference, &scene, i))),
+        [1, 0].map(|i| bits(&view(&reference, scene, i))),
         [expected[1].clone(), expected[0].clone()],
         "warm"
     );
     for (threads, cache_bytes) in [(1, 100_000_000), (2, 200_000), (8, 200_000), (2, 0), (8, 20_000)] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         pool.install(|| {
-            let projector = projector(&scene, settings(cache_bytes));
+            let projector = projector(scene, settings(cache_bytes));
             for i in [1, 0] {
                 assert_eq!(
-                    bits(&view(&projector, &scene, i)),
+                    bits(&view(&projector, scene, i)),
                     expected[i],
                     "{threads} threads, {cache_bytes} bytes"
                 );
@@ -72,7 +79,13 @@ fn the_error_falls_with_the_threshold_and_tracing_with_the_depth() {
     let views = scene.beam.views().expect("views");
     let run = |distance_threshold: f64, max_depth: u32| {
         let parameters = Parameters { distance_threshold, max_depth, ..Parameters::default() };
-        let projector = projector(&scene, TreeSettings { parameters, ..TreeSettings::default() });
+        let projector = projector(
+            &scene,
+            TreeSettings {
+                interpolation: Interpolation::Quadrilinear { parameters },
+                ..TreeSettings::default()
+            },
+        );
         let projection = view(&projector, &scene, 0);
         assert_eq!(projector.spot_check(&[], 1, 3), None, "no views, nothing to compare");
         let error = projector.spot_check(&views[..1], 20_000, 3).expect("trees").mean;
@@ -150,9 +163,10 @@ fn trees_of_any_tolerance_depth_and_cache_stay_whole_and_keep_their_answers() {
         [(0.0, 12), (f64::MIN_POSITIVE, 20), (f64::MAX, 28), (0.02, 0), (0.02, 60)]
     {
         let parameters = Parameters { distance_threshold, max_depth, ..Parameters::default() };
+        let interpolation = Interpolation::Quadrilinear { parameters };
         let mut first = None;
         for cache_bytes in [100_000_000, 100_000, 1_000, 0] {
-            let settings = TreeSettings { parameters, cache_bytes, ..TreeSettings::default() };
+            let settings = TreeSettings { interpolation, cache_bytes, ..TreeSettings::default() };
             let projector = projector(&scene, settings);
             let views = [0, 1].map(|i| bits(&view(&projector, &scene, i)));
             projector.check_invariants();
@@ -160,7 +174,7 @@ fn trees_of_any_tolerance_depth_and_cache_stay_whole_and_keep_their_answers() {
             assert!(*expected == views, "{distance_threshold}, depth {max_depth}, {cache_bytes} bytes");
         }
         // Whatever is traced is exact; whatever is interpolated is a length.
-        let settings = TreeSettings { parameters, ..TreeSettings::default() };
+        let settings = TreeSettings { interpolation, ..TreeSettings::default() };
         let lengths = view(&projector(&scene, settings), &scene, 0).own_length_mm(1);
         assert!(lengths.iter().all(|length| (0.0..=40.5).contains(length)), "{distance_threshold}");
         if max_depth == 0 {
@@ -240,4 +254,21 @@ fn at_the_end_of_time_trees_are_pruned_without_judgement_and_answer_alike() {
     tree.prune(oldest_to_keep(stamps, 0), &cache);
     assert_eq!(ask(&tree), before);
     assert_eq!(tree.check_invariants(), cache.used_bytes());
+}
+
+#[test]
+fn squared_chords_keep_to_their_tolerance() {
+    let scene = cone_scene(200);
+    let views = scene.beam.views().expect("views");
+    for tolerance_mm in [2.0, 0.5, 0.1] {
+        let interpolation = Interpolation::SquaredChord { tolerance_mm };
+        let projector = projector(&scene, TreeSettings { interpolation, ..TreeSettings::default() });
+        let projection = view(&projector, &scene, 0);
+        let found = projection.found();
+        let count = |kind| found.iter().filter(|&&found| found == kind).count();
+        assert!(count(Found::Interpolated) > 3 * count(Found::Traced), "{tolerance_mm} mm");
+        let errors = projector.spot_check(&views, 20_000, 3).expect("trees");
+        assert!(errors.compared > 2_000);
+        assert!(errors.p999 <= tolerance_mm && errors.max <= 5.0 * tolerance_mm, "{errors:?}");
+    }
 }

@@ -1,3 +1,4 @@
 //! Attributes of lines that RI-trees hold.
 
 pub mod chord;
+pub mod squared_chord;

@@ -131,20 +131,24 @@ pub struct MethodArgs {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Method")]
 pub struct TreeArgs {
-    /// RI-tree: a cell splits if its middle is interpolated worse than this, in half the longest side of the organ's box.
-    #[arg(long, value_name = "D", default_value_t = 0.05, allow_negative_numbers = true)]
-    pub distance_threshold: f64,
-    /// RI-tree: output directions farther apart than this are not interpolated (chords have none).
-    #[arg(
-        long = "angular-threshold-deg",
-        value_name = "DEG",
-        default_value_t = 30.0,
-        allow_negative_numbers = true
-    )]
-    pub angular_threshold_deg: f64,
-    /// RI-tree: cells of this depth are final, whatever their middle says: a low depth gives an error without bound.
-    #[arg(long, value_name = "N", default_value_t = 28, value_parser = clap::value_parser!(u32).range(0..=60))]
-    pub max_depth: u32,
+    /// RI-tree: how far an interpolated length may be off, such as `0.1mm`: of 1000, 999 are within this of the exact one, and
+    /// none is meant to be farther off than five times it [default: 0.5mm]
+    #[arg(long, value_name = "MM", value_parser = parse_mm, allow_hyphen_values = true)]
+    pub tolerance: Option<f64>,
+    /// RI-tree: what is interpolated between samples; the paper's if one of its thresholds is given.
+    #[arg(long, value_enum)]
+    pub interpolation: Option<InterpolationArg>,
+    /// Quadrilinear: a cell splits if its middle is interpolated worse than this, in half the longest side of the organ's
+    /// box [default: 0.05]
+    #[arg(long, value_name = "D", allow_negative_numbers = true)]
+    pub distance_threshold: Option<f64>,
+    /// Quadrilinear: output directions farther apart than this are not interpolated (chords have none) [default: 30]
+    #[arg(long = "angular-threshold-deg", value_name = "DEG", allow_negative_numbers = true)]
+    pub angular_threshold_deg: Option<f64>,
+    /// Quadrilinear: cells of this depth are final, whatever their middle says: a low depth gives an error without bound
+    /// [default: 28]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=60))]
+    pub max_depth: Option<u32>,
     /// RI-tree: the most that nodes and samples of all trees may hold, megabytes.
     #[arg(long, value_name = "MB", default_value_t = 100.0, allow_negative_numbers = true)]
     pub cache_mb: f64,
@@ -154,6 +158,15 @@ pub struct TreeArgs {
     /// RI-tree: bodies with fewer face planes are clipped instead.
     #[arg(long, value_name = "N", default_value_t = 48)]
     pub tree_planes: usize,
+}
+
+/// What is interpolated, as an argument.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum InterpolationArg {
+    /// Cubics of the squared chord, to within a tolerance.
+    SquaredChord,
+    /// Lengths at the 16 corners of a cell, by the paper's thresholds.
+    Quadrilinear,
 }
 
 /// A method as an argument.
@@ -365,6 +378,12 @@ fn parse_pixels(text: &str) -> Result<[u32; 2], String> {
 
 fn parse_extent(text: &str) -> Result<[f64; 2], String> {
     numbers(text, 'x')
+}
+
+/// Millimetres, with or without the unit.
+fn parse_mm(text: &str) -> Result<f64, String> {
+    let number = text.strip_suffix("mm").unwrap_or(text).trim();
+    number.parse().map_err(|_| "give millimetres, as `0.1mm` or `0.1`".into())
 }
 
 fn parse_window(text: &str) -> Result<[f64; 2], String> {

@@ -183,6 +183,40 @@ impl ClosedMesh {
         vertex.map(|v| (height, v))
     }
 
+    /// A bound of the vertices' heights over the plane through `from` across `normal`, no more than `slack` above the highest
+    /// (or above `at_least`, if that is higher), and the highest vertex seen on the way. Quicker than to find the highest.
+    pub fn height_bound(
+        &self,
+        normal: DVec3,
+        from: DVec3,
+        at_least: f64,
+        slack: f64,
+    ) -> (f64, Option<DVec3>) {
+        let best = std::cell::Cell::new((at_least, None));
+        let bound = std::cell::Cell::new(at_least);
+        self.tree.visit(
+            |b| {
+                let corner = DVec3::select(normal.cmpge(DVec3::ZERO), b.max, b.min);
+                let height = normal.dot(corner - from);
+                let is_higher = height > best.get().0 + slack;
+                if !is_higher {
+                    bound.set(bound.get().max(height));
+                }
+                is_higher
+            },
+            |face| {
+                for vertex in self.mesh.triangle(face as usize) {
+                    let height = normal.dot(vertex - from);
+                    if height > best.get().0 {
+                        best.set((height, Some(vertex)));
+                    }
+                }
+            },
+        );
+        let (height, vertex) = best.get();
+        (bound.get().max(height), vertex)
+    }
+
     /// The distance from `point` to the surface, mm, in f64.
     pub fn distance_mm(&self, point: DVec3) -> f64 {
         let to_face = |f: usize| super::predicates::squared_distance(point, self.mesh.triangle(f));

@@ -49,17 +49,23 @@ pub enum Reason {
     Angle,
     /// All corners miss, and nothing proves that the lines between do.
     Guard,
+    /// The cell's model may be off by more than the tolerance there.
+    Tolerance,
 }
 
 /// A cell of one plane pair, as deep in the tree as it is small.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
+    /// The plane pair.
     pub pair: PlanePair,
+    /// The cell.
     pub cell: Cell,
+    /// How often the root's cell was halved.
     pub depth: u32,
 }
 
 impl Place {
+    /// All lines of a plane pair.
     pub fn root(pair: PlanePair) -> Self {
         Self { pair, cell: Cell::ROOT, depth: 0 }
     }
@@ -75,6 +81,7 @@ impl Place {
         usize::from(stuv[axis] >= 0.5 * (self.cell.low[axis] + self.cell.high[axis]))
     }
 
+    /// One half: 0 or 1.
     pub fn half(&self, side: usize) -> Self {
         Self { cell: self.cell.halves(self.axis())[side], depth: self.depth + 1, ..*self }
     }

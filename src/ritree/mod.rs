@@ -19,6 +19,7 @@
 pub mod attribute;
 mod cache;
 mod cell;
+mod fitted;
 mod node;
 mod stats;
 #[cfg(test)]
@@ -29,11 +30,12 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 pub use attribute::Attribute;
 pub use cache::{Cache, oldest_to_keep};
-pub use cell::Reason;
+pub use cell::{Place, Reason};
+pub use fitted::{Fit, Fitted, FittedTree};
 pub use stats::{BuildCounts, TreeShape};
 
 use crate::linespace::{LinePoint, PlanePair, is_in_range};
-use cell::{Kind, Place, Verdict, quadrilinear};
+use cell::{Kind, Verdict, quadrilinear};
 use node::{Leaf, Node};
 use stats::BuildCounters;
 

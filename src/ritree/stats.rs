@@ -87,11 +87,19 @@ pub struct TreeShape {
 
 impl TreeShape {
     pub(super) fn add_leaf(&mut self, depth: usize, kind: Kind) {
-        match kind {
-            Kind::Smooth => self.smooth_leaves += 1,
-            Kind::Empty => self.empty_leaves += 1,
-            Kind::TwoClasses | Kind::Traced(_) => self.traced_leaves += 1,
-        }
+        self.count_leaf(
+            depth,
+            match kind {
+                Kind::Smooth => |shape| &mut shape.smooth_leaves,
+                Kind::Empty => |shape| &mut shape.empty_leaves,
+                Kind::TwoClasses | Kind::Traced(_) => |shape| &mut shape.traced_leaves,
+            },
+        );
+    }
+
+    /// Counts a leaf of some depth in one of the numbers.
+    pub fn count_leaf(&mut self, depth: usize, number: fn(&mut Self) -> &mut u64) {
+        *number(self) += 1;
         if self.leaves_by_depth.len() <= depth {
             self.leaves_by_depth.resize(depth + 1, 0);
         }

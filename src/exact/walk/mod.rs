@@ -21,7 +21,7 @@ mod sets;
 #[cfg(test)]
 mod tests;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::shear::Shear;
 use crate::geometry::numeric::{UNIT_ROUNDOFF, gamma};
@@ -119,6 +119,23 @@ impl Walker {
         };
         walker.seeds = SeedTable::new(&walker);
         walker
+    }
+
+    /// A point in the middle of the body, mm, and the linear map from mm about it to a frame in which the body is about a
+    /// ball of radius 1: its ellipsoid of inertia becomes that ball.
+    pub fn ball_frame(&self) -> (DVec3, DMat3) {
+        self.seeds.ball_frame()
+    }
+
+    /// A vertex about as far along `normal` as any: of an ellipsoid, one near the farthest.
+    pub fn vertex_towards(&self, normal: DVec3) -> DVec3 {
+        self.vertices[self.faces[self.seeds.facing(normal) as usize].corners[0] as usize]
+    }
+
+    /// Whether the line from `origin` along `dir`, mm, passes so far by that it surely misses: quicker than a walk.
+    #[inline]
+    pub fn passes_by(&self, origin: DVec3, dir: DVec3) -> bool {
+        self.seeds.passes_by(origin, dir)
     }
 
     /// The line's way through the body, from seeds by the line's place. `Ok(None)` if it misses.

@@ -94,6 +94,11 @@ impl SeedTable {
         table
     }
 
+    /// The middle, and the map from mm about it to the ball's frame.
+    pub fn ball_frame(&self) -> (DVec3, DMat3) {
+        (self.middle, self.to_ball)
+    }
+
     /// Seeds for the line from `o` along `d`, mm: the faces near where it would cross a ball about the middle as large as
     /// the body is there. `None` if it passes the ball by that holds the body, and so misses.
     #[inline]
@@ -123,6 +128,11 @@ impl SeedTable {
         let (o, d) = (self.to_ball * (o - self.middle), self.to_ball * d);
         let foot = o - (o.dot(d) / d.length_squared()) * d;
         foot.length_squared() > self.holding_squared + PASSING_BY * o.length_squared()
+    }
+
+    /// The face at which the ball's plane across `normal` would touch.
+    pub fn facing(&self, normal: DVec3) -> u32 {
+        self.cell(self.to_ball.inverse().transpose() * normal).face
     }
 
     /// A face that looks along `dir`.

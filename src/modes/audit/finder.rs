@@ -7,6 +7,7 @@
 
 use rayon::prelude::*;
 
+use crate::attributes::squared_chord::{ImageChords, ImageLengths, places_of};
 use crate::exact::{Body, BodyView, Engine, Lengths, Spans};
 use crate::geometry::{Region, Segment};
 use crate::modes::project::forest::{Forest, holds_box};
@@ -44,6 +45,11 @@ pub(super) trait Finder: Sync {
     fn needs_image(&self, _organ: usize) -> bool {
         false
     }
+
+    /// Whether an organ's rays may be interpolated.
+    fn is_in_tree(&self, organ: usize) -> bool {
+        !self.needs_image(organ)
+    }
 }
 
 /// A [`Finder`] at work.
@@ -65,7 +71,7 @@ impl<'a> ByMethod<'a> {
             Method::Exact(engine) => (engine, None),
             Method::RiTree(settings) => (None, Some(settings)),
         };
-        let forest = settings.map(|settings| Forest::new(bodies.clone(), settings));
+        let forest = settings.map(|settings| Forest::new(bodies.clone(), settings, false));
         Self { bodies, engine, forest }
     }
 
@@ -80,7 +86,9 @@ impl Finder for ByMethod<'_> {
             view.filter(|_| !self.grows(organ)).map(|view| body.view(view.rays(), self.engine))
         };
         let views = self.bodies.par_iter().enumerate().map(ready).collect();
-        Box::new(MethodReady { finder: self, views })
+        let in_runs = |organ: usize| self.forest.as_ref()?.image(organ, view?.rays());
+        let images = (0..self.bodies.len()).into_par_iter().map(in_runs).collect();
+        Box::new(MethodReady { finder: self, views, images })
     }
 
     fn depth(&self, organ: usize, ray: &Segment) -> Option<u32> {
@@ -90,7 +98,11 @@ impl Finder for ByMethod<'_> {
     }
 
     fn needs_image(&self, organ: usize) -> bool {
-        !self.grows(organ)
+        !self.grows(organ) || self.forest.as_ref().is_some_and(Forest::finds_runs)
+    }
+
+    fn is_in_tree(&self, organ: usize) -> bool {
+        self.grows(organ)
     }
 }
 
@@ -98,12 +110,20 @@ struct MethodReady<'f, 'a> {
     finder: &'f ByMethod<'a>,
     /// The organs that are not in trees, ready for the view.
     views: Vec<Option<BodyView<'f>>>,
+    /// The organs in trees that find the view's rays in runs.
+    images: Vec<Option<ImageChords<'a>>>,
 }
 
 impl Ready for MethodReady<'_, '_> {
     fn find(&self, organ: usize, batch: Batch, answers: &mut Vec<Answer>) {
         let forest = self.finder.forest.as_ref().filter(|forest| forest.grows(organ));
         match (forest, &self.views[organ], batch.region) {
+            (Some(forest), _, Some(region)) if self.images[organ].is_some() => {
+                if let Some(image) = &self.images[organ] {
+                    find_in_runs(forest, organ, image, region, answers);
+                }
+                forest.prune_if_full();
+            }
             (Some(forest), ..) => {
                 ask_tree(forest, organ, self.finder.bodies[organ], batch.rays, answers);
                 forest.prune_if_full();
@@ -131,16 +151,51 @@ fn keep(lengths: &[f64], answers: &mut Vec<Answer>) {
     answers.extend(lengths.iter().map(|&length_mm| Answer { length_mm, found: Found::Traced }));
 }
 
+/// The lengths of a region's rays in a tree's organ, as a projection finds them: in runs.
+fn find_in_runs<'a>(
+    forest: &Forest<'a>,
+    organ: usize,
+    image: &ImageChords<'a>,
+    region: &Region,
+    answers: &mut Vec<Answer>,
+) {
+    let (mut lengths, mut open) = (vec![0.0; region.pixels()], Vec::new());
+    let mut found = ImageLengths { lengths: &mut lengths, middles: None, open: &mut open };
+    forest.enter().find(organ, image, region, &mut found);
+    answers.clear();
+    answers.resize(lengths.len(), Answer { length_mm: 0.0, found: Found::Interpolated });
+    for run in &open {
+        let (run, at) = places_of(region, run);
+        image.exact().trace(&run, &mut Lengths(&mut lengths[at.clone()]));
+        answers[at].iter_mut().for_each(|answer| answer.found = Found::Traced);
+    }
+    answers.iter_mut().zip(&lengths).for_each(|(answer, length)| answer.length_mm = *length);
+}
+
 /// The lengths of rays in a tree's organ, as a projection finds them: what the tree does not know is traced.
 fn ask_tree(forest: &Forest, organ: usize, body: &Body, rays: &[Segment], answers: &mut Vec<Answer>) {
     answers.clear();
     answers.resize(rays.len(), Answer::default());
     let grove = forest.enter();
     let Some(tree) = grove.tree(organ) else { return };
-    grove.chords(tree, body, rays, &mut Spans::default(), |ray, found, part| {
-        answers[ray].found = found;
-        answers[ray].length_mm += part.map_or(0.0, |part| part.length());
-    });
+    let bounds = body.bounds();
+    let (mut open, mut open_rays) = (Vec::new(), Vec::new());
+    for (i, ray) in rays.iter().enumerate() {
+        let known = if holds_box(ray, &bounds) { grove.length_mm(tree, ray).ok() } else { None };
+        match known {
+            Some(length_mm) => {
+                answers[i] = Answer { length_mm, found: Found::Interpolated };
+            }
+            None => {
+                open.push(i);
+                open_rays.push(*ray);
+                answers[i].found = Found::Traced;
+            }
+        }
+    }
+    let mut spans = Spans::default();
+    body.trace(body.engine_for_rays(), 0, &open_rays, &mut spans);
+    spans.drain(|at, part| answers[open[at]].length_mm += part.length());
 }
 
 /// The reference: clipping for convex bodies, the hierarchy of boxes for all others; each ray by itself.

@@ -74,7 +74,7 @@ impl Audit<'_> {
         for &organ in organs {
             method.find(organ, batch, &mut near);
             against.find(organ, batch, &mut exact);
-            let is_in_tree = !self.method.needs_image(organ);
+            let is_in_tree = self.method.is_in_tree(organ);
             for ((pixel, near), exact) in pixels.iter_mut().zip(&near).zip(&exact) {
                 pixel.reference += self.optics.exponent(organ, exact.length_mm);
                 pixel.method += self.optics.exponent(organ, near.length_mm);

@@ -30,12 +30,13 @@ pub struct CurveSettings {
 }
 
 impl CurveSettings {
-    /// All methods, the trees at the paper's range of thresholds.
+    /// All methods: trees of squared chords at a range of tolerances, the paper's at its range of thresholds.
     pub fn contenders() -> Vec<Contender> {
         let engines = [None, Some(Engine::Raster), Some(Engine::Walk), Some(Engine::Bvh), Some(Engine::Clip)];
-        let thresholds = [0.25, 0.1, 0.05, 0.025, 0.01];
         let exact = engines.into_iter().map(Contender::exact);
-        exact.chain(thresholds.into_iter().map(Contender::paper)).collect()
+        let tolerances = [5.0, 2.0, 0.5, 0.1, 0.02].map(Contender::tolerance);
+        let thresholds = [0.25, 0.1, 0.05, 0.025, 0.01].map(Contender::paper);
+        exact.chain(tolerances).chain(thresholds).collect()
     }
 }
 

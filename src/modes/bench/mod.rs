@@ -27,7 +27,7 @@ pub use samples::{Samples, Times};
 use crate::error::Result;
 use crate::exact::Engine;
 use crate::modes::Control;
-use crate::modes::project::{Method, Projector, TreeSettings, Wanted};
+use crate::modes::project::{Interpolation, Method, Projector, TreeSettings, Wanted};
 use crate::ritree::Parameters;
 use crate::scene::{Scene, View};
 
@@ -61,9 +61,19 @@ impl Contender {
     /// The paper's trees at a distance threshold.
     pub fn paper(distance_threshold: f64) -> Self {
         let parameters = Parameters { distance_threshold, ..Parameters::default() };
+        let interpolation = Interpolation::Quadrilinear { parameters };
         Self {
-            method: Method::RiTree(TreeSettings { parameters, ..TreeSettings::default() }),
+            method: Method::RiTree(TreeSettings { interpolation, ..TreeSettings::default() }),
             dial: Some(Dial { option: "distance-threshold", value: distance_threshold }),
+        }
+    }
+
+    /// Trees of squared chords that keep to a tolerance, mm.
+    pub fn tolerance(tolerance_mm: f64) -> Self {
+        let interpolation = Interpolation::SquaredChord { tolerance_mm };
+        Self {
+            method: Method::RiTree(TreeSettings { interpolation, ..TreeSettings::default() }),
+            dial: Some(Dial { option: "tolerance", value: tolerance_mm }),
         }
     }
 

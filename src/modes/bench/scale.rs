@@ -191,7 +191,8 @@ const PLANS: [Plan; 6] = [
 
 fn all() -> Vec<Contender> {
     let engines = [None, Some(Engine::Raster), Some(Engine::Walk), Some(Engine::Bvh)];
-    engines.into_iter().map(Contender::exact).chain([Contender::paper(0.05)]).collect()
+    let trees = [Contender::tolerance(0.5), Contender::paper(0.05)];
+    engines.into_iter().map(Contender::exact).chain(trees).collect()
 }
 
 fn with_cache(contender: Contender, kilobytes: u32) -> Contender {

@@ -44,7 +44,7 @@ impl<'a> Tracer<'a> {
                 ));
             }
             Method::Exact(engine) => (engine, None),
-            Method::RiTree(settings) => (None, Some(Forest::new(bodies.clone(), settings))),
+            Method::RiTree(settings) => (None, Some(Forest::new(bodies.clone(), settings, true))),
         };
         Ok(Self { bodies, bounds, engine, forest })
     }

@@ -149,7 +149,7 @@ fn scaling(oracles: &Oracles, subject: &str, body: &Body, asked: &Asked) -> Verd
             return Verdict::does_not_apply(SCALING, subject, "the scaled surface is no body");
         };
         for (rays, before) in asked {
-            let after = oracles.witness.lengths(&image, &rays.mapped(&map));
+            let after = oracles.witness.lengths_at_scale(factor, &image, &rays.mapped(&map));
             rays_asked += after.len();
             differ += before.lengths.len().abs_diff(after.len());
             differ += before

@@ -4,7 +4,8 @@ use super::*;
 use crate::exact::Engine;
 use crate::geometry::primitives::{cube, icosphere, prism};
 use crate::geometry::{ClosedMesh, Interval, TriMesh};
-use crate::modes::project::TreeSettings;
+use crate::modes::project::{Interpolation, TreeSettings};
+use crate::ritree::Parameters;
 
 /// Enough to tell a fault of a part in a thousand.
 const SMALL: Size = Size { pixels: 32, lines: 4_000, directions: 2 };
@@ -50,9 +51,13 @@ fn every_exact_engine_satisfies_every_oracle() {
 
 #[test]
 fn trees_keep_their_promise_in_the_mean_and_scale_to_the_last_bit() {
-    let witness = MethodWitness::new(Method::RiTree(TreeSettings::default()));
-    let verdicts = Oracles::new(&witness, SEED, SMALL).question("ellipsoid", &ellipsoid());
-    assert_eq!(failed(&verdicts), [""; 0], "{}", table(&verdicts));
+    let papers = Interpolation::Quadrilinear { parameters: Parameters::default() };
+    for interpolation in [Interpolation::default(), papers] {
+        let settings = TreeSettings { interpolation, ..TreeSettings::default() };
+        let witness = MethodWitness::new(Method::RiTree(settings));
+        let verdicts = Oracles::new(&witness, SEED, SMALL).question("ellipsoid", &ellipsoid());
+        assert_eq!(failed(&verdicts), [""; 0], "{}", table(&verdicts));
+    }
 }
 
 #[test]

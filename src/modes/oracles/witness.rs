@@ -3,8 +3,8 @@
 use super::Rays;
 use crate::exact::{Body, Engine, Lengths, Record, Spans};
 use crate::geometry::{Interval, Segment};
-use crate::modes::project::Method;
 use crate::modes::project::forest::{Forest, Grove, holds_box};
+use crate::modes::project::{Interpolation, Method, TreeSettings};
 
 /// A way to find the lengths of rays in bodies.
 pub trait Witness: Sync {
@@ -28,6 +28,12 @@ pub trait Witness: Sync {
     /// for rounding.
     fn promised_error_mm(&self, _body: &Body) -> f64 {
         0.0
+    }
+
+    /// As [`lengths`](Self::lengths), of a body `factor` times as large as one asked for before: what the witness is told in mm
+    /// is told in as many times more.
+    fn lengths_at_scale(&self, _factor: f64, body: &Body, rays: &Rays) -> Vec<f64> {
+        self.lengths(body, rays)
     }
 
     /// Whether it finds the lengths of lists of rays in `body`, not of images only.
@@ -78,7 +84,7 @@ impl Witness for MethodWitness {
                 parts
             }
             Method::RiTree(settings) => {
-                let forest = Forest::new(vec![body], settings);
+                let forest = Forest::new(vec![body], settings, true);
                 interpolate_all(&forest, body, rays)
             }
         }
@@ -89,7 +95,7 @@ impl Witness for MethodWitness {
             Method::Exact(_) => sets.iter().map(|rays| self.parts(body, rays)).collect(),
             // One tree for all: what becomes of a cell does not depend on who asks.
             Method::RiTree(settings) => {
-                let forest = Forest::new(vec![body], settings);
+                let forest = Forest::new(vec![body], settings, true);
                 sets.iter().map(|rays| interpolate_all(&forest, body, rays)).collect()
             }
         }
@@ -109,11 +115,28 @@ impl Witness for MethodWitness {
     /// middles, and is held here to the mean over all rays.
     fn promised_error_mm(&self, body: &Body) -> f64 {
         match self.method {
-            Method::RiTree(settings) if Forest::new(vec![body], settings).grows(0) => {
-                settings.parameters.distance_threshold * 0.5 * body.bounds().size().max_element()
+            Method::RiTree(settings) if Forest::new(vec![body], settings, true).grows(0) => {
+                match settings.interpolation {
+                    Interpolation::Quadrilinear { parameters } => {
+                        parameters.distance_threshold * 0.5 * body.bounds().size().max_element()
+                    }
+                    Interpolation::SquaredChord { tolerance_mm } => tolerance_mm,
+                }
             }
             _ => 0.0,
         }
+    }
+
+    fn lengths_at_scale(&self, factor: f64, body: &Body, rays: &Rays) -> Vec<f64> {
+        let mut method = self.method;
+        if let Method::RiTree(TreeSettings {
+            interpolation: Interpolation::SquaredChord { tolerance_mm },
+            ..
+        }) = &mut method
+        {
+            *tolerance_mm *= factor;
+        }
+        Self { method }.lengths(body, rays)
     }
 
     fn takes_lists(&self, _: &Body) -> bool {

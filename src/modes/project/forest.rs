@@ -6,16 +6,46 @@ use std::sync::{OnceLock, PoisonError, RwLock, RwLockReadGuard};
 use serde::Serialize;
 
 use crate::attributes::chord::ChordLength;
+use crate::attributes::squared_chord::{ImageChords, ImageLengths, Known, SquaredChord};
 use crate::exact::{Body, Spans};
-use crate::geometry::{Interval, Segment};
+use crate::geometry::{Interval, RayGrid, Region, Segment};
 use crate::modes::project::Found;
-use crate::ritree::{Answer, BuildCounts, Cache, Parameters, Reason, RiTree, TreeShape, oldest_to_keep};
+use crate::ritree::{
+    Answer, BuildCounts, Cache, FittedTree, Parameters, Reason, RiTree, TreeShape, oldest_to_keep,
+};
 
-/// How RI-trees are grown; the defaults are the paper's.
+/// How lengths between samples are found.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(tag = "interpolation", rename_all = "kebab-case")]
+pub enum Interpolation {
+    /// The paper's: each cell's 16 corners, by its thresholds.
+    Quadrilinear {
+        /// The thresholds and the depth.
+        parameters: Parameters,
+    },
+    /// A cubic of the squared chord in each cell, to within a tolerance.
+    SquaredChord {
+        /// Of 1000 lengths, 999 are within this of the exact one, mm; what is left is no farther than five times it.
+        tolerance_mm: f64,
+    },
+}
+
+/// How far lengths may be off if nobody says, mm: somewhat more than the facets of an organ of twenty thousand faces are, so
+/// that cells are as large as they can be.
+pub const DEFAULT_TOLERANCE_MM: f64 = 0.5;
+
+impl Default for Interpolation {
+    fn default() -> Self {
+        Self::SquaredChord { tolerance_mm: DEFAULT_TOLERANCE_MM }
+    }
+}
+
+/// How RI-trees are grown.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TreeSettings {
-    /// The thresholds and the depth.
-    pub parameters: Parameters,
+    /// What is interpolated, and how well.
+    #[serde(flatten)]
+    pub interpolation: Interpolation,
     /// The most that nodes and samples of all trees may hold, bytes.
     pub cache_bytes: usize,
     /// The share of the cache that pruning keeps.
@@ -27,7 +57,7 @@ pub struct TreeSettings {
 impl Default for TreeSettings {
     fn default() -> Self {
         Self {
-            parameters: Parameters::default(),
+            interpolation: Interpolation::default(),
             cache_bytes: 100_000_000,
             kept_share: 0.3,
             least_planes: 48,
@@ -52,6 +82,8 @@ pub struct QueryCounts {
     pub traced_guard: u64,
     /// Not asked: the source or the target lies within the organ's box, so the whole line's chord does not serve.
     pub traced_source_or_target_inside: u64,
+    /// Traced: the model of the squared chord may be off by more than the tolerance, as along the body's outline.
+    pub traced_tolerance: u64,
     /// Not asked: the body is not convex, or has so few faces that clipping is cheaper.
     pub traced_without_tree: u64,
 }
@@ -64,6 +96,7 @@ impl std::ops::AddAssign for QueryCounts {
         self.traced_classes += other.traced_classes;
         self.traced_angle += other.traced_angle;
         self.traced_guard += other.traced_guard;
+        self.traced_tolerance += other.traced_tolerance;
         self.traced_source_or_target_inside += other.traced_source_or_target_inside;
         self.traced_without_tree += other.traced_without_tree;
     }
@@ -76,6 +109,7 @@ impl QueryCounts {
             Reason::Classes => self.traced_classes += 1,
             Reason::Angle => self.traced_angle += 1,
             Reason::Guard => self.traced_guard += 1,
+            Reason::Tolerance => self.traced_tolerance += 1,
         }
     }
 }
@@ -97,11 +131,31 @@ pub struct ForestReport {
     pub cache_bytes: usize,
 }
 
+/// The tree of one organ.
+pub enum OrganTree<'a> {
+    /// The paper's.
+    Quadrilinear(RiTree<ChordLength<'a>>),
+    /// Of squared chords.
+    SquaredChord(FittedTree<SquaredChord<'a>>),
+}
+
+/// Calls a method that both kinds of trees have.
+macro_rules! either {
+    ($tree:expr, $name:ident => $call:expr) => {
+        match $tree {
+            OrganTree::Quadrilinear($name) => $call,
+            OrganTree::SquaredChord($name) => $call,
+        }
+    };
+}
+
 /// One tree per organ, under one cache.
 pub struct Forest<'a> {
-    trees: RwLock<Vec<OnceLock<RiTree<ChordLength<'a>>>>>,
+    trees: RwLock<Vec<OnceLock<OrganTree<'a>>>>,
     bodies: Vec<&'a Body>,
     settings: TreeSettings,
+    /// Whether it is asked where chords lie, besides their lengths.
+    wants_places: bool,
     cache: Cache,
     /// Tiles so far: the time of all trees.
     clock: AtomicU32,
@@ -109,30 +163,52 @@ pub struct Forest<'a> {
 
 /// Many trees to ask, none of them pruned meanwhile.
 pub struct Grove<'f, 'a> {
-    trees: RwLockReadGuard<'f, Vec<OnceLock<RiTree<ChordLength<'a>>>>>,
+    trees: RwLockReadGuard<'f, Vec<OnceLock<OrganTree<'a>>>>,
     forest: &'f Forest<'a>,
     now: u32,
 }
 
 impl<'a> Forest<'a> {
-    pub fn new(bodies: Vec<&'a Body>, settings: TreeSettings) -> Self {
+    pub fn new(bodies: Vec<&'a Body>, settings: TreeSettings, wants_places: bool) -> Self {
         let trees = RwLock::new(bodies.iter().map(|_| OnceLock::new()).collect());
         let cache = Cache::new(settings.cache_bytes);
-        Self { trees, bodies, settings, cache, clock: AtomicU32::new(1) }
+        Self { trees, bodies, settings, wants_places, cache, clock: AtomicU32::new(1) }
     }
 
     /// Whether an organ's body is put in a tree.
     pub fn grows(&self, organ: usize) -> bool {
-        self.attribute(organ).is_some()
+        let convex = self.bodies[organ].convexity();
+        convex.is_ok_and(|convex| convex.planes().len() >= self.settings.least_planes)
+            && ChordLength::new(self.bodies[organ]).is_some()
     }
 
-    fn attribute(&self, organ: usize) -> Option<ChordLength<'a>> {
+    fn new_tree(&self, organ: usize) -> Option<OrganTree<'a>> {
         let body = self.bodies[organ];
-        let convex = body.convexity().ok()?;
-        if convex.planes().len() < self.settings.least_planes {
-            return None;
+        let quadrilinear = |parameters| {
+            ChordLength::new(body).map(|chords| OrganTree::Quadrilinear(RiTree::new(chords, parameters)))
+        };
+        match self.settings.interpolation {
+            Interpolation::Quadrilinear { parameters } => quadrilinear(parameters),
+            Interpolation::SquaredChord { tolerance_mm } => {
+                SquaredChord::new(body, tolerance_mm, self.wants_places)
+                    .map(|chords| OrganTree::SquaredChord(FittedTree::new(chords)))
+                    // A body too flat for a frame is still not lost: nothing of it is interpolated.
+                    .or_else(|| quadrilinear(Parameters { max_depth: 0, ..Parameters::default() }))
+            }
         }
-        ChordLength::new(body)
+    }
+
+    /// Whether trees find the rays of an image in runs, so that what a pixel gets takes its image to be found again.
+    pub fn finds_runs(&self) -> bool {
+        matches!(self.settings.interpolation, Interpolation::SquaredChord { .. })
+    }
+
+    /// The organ's body made ready for the rays of a grid. `None` if there is no tree to find them in runs.
+    pub fn image(&self, organ: usize, grid: &RayGrid) -> Option<ImageChords<'a>> {
+        match self.enter().tree(organ)? {
+            OrganTree::SquaredChord(tree) => ImageChords::new(tree.fit(), grid),
+            OrganTree::Quadrilinear(_) => None,
+        }
     }
 
     /// The trees, to be asked by one thread for the rays of one tile: the only lock, and not per ray.
@@ -153,10 +229,12 @@ impl<'a> Forest<'a> {
             return;
         }
         let mut stamps = Vec::new();
-        trees.iter().filter_map(OnceLock::get).for_each(|tree| tree.collect_stamps(&mut stamps));
+        let all = trees.iter().filter_map(OnceLock::get);
+        all.for_each(|tree| either!(tree, tree => tree.collect_stamps(&mut stamps)));
         let kept_bytes = (self.settings.kept_share * self.cache.limit_bytes() as f64) as usize;
         let oldest = oldest_to_keep(stamps, kept_bytes);
-        trees.iter_mut().filter_map(OnceLock::get_mut).for_each(|tree| tree.prune(oldest, &self.cache));
+        let all = trees.iter_mut().filter_map(OnceLock::get_mut);
+        all.for_each(|tree| either!(tree, tree => tree.prune(oldest, &self.cache)));
         self.cache.relieved();
     }
 
@@ -169,8 +247,8 @@ impl<'a> Forest<'a> {
         };
         for tree in grove.trees.iter().filter_map(OnceLock::get) {
             report.trees += 1;
-            report.build += tree.build_counts();
-            report.shape.add(&tree.shape());
+            report.build += either!(tree, tree => tree.build_counts());
+            report.shape.add(&either!(tree, tree => tree.shape()));
         }
         report
     }
@@ -180,8 +258,9 @@ impl<'a> Forest<'a> {
     /// # Panics
     /// If something stored is not what its cell says.
     pub fn check_invariants(&self) {
-        let bytes: usize =
-            self.enter().trees.iter().filter_map(OnceLock::get).map(RiTree::check_invariants).sum();
+        let grove = self.enter();
+        let trees = grove.trees.iter().filter_map(OnceLock::get);
+        let bytes: usize = trees.map(|tree| either!(tree, tree => tree.check_invariants())).sum();
         assert_eq!(bytes, self.cache.used_bytes(), "the cache counts what the trees hold");
         assert!(bytes <= self.cache.limit_bytes(), "the cache keeps its promise");
     }
@@ -189,28 +268,62 @@ impl<'a> Forest<'a> {
 
 impl<'a> Grove<'_, 'a> {
     /// The tree of an organ. `None` if its body is not put in a tree.
-    pub fn tree(&self, organ: usize) -> Option<&RiTree<ChordLength<'a>>> {
-        let tree = match self.trees[organ].get() {
-            Some(tree) => tree,
-            None => {
-                let attribute = self.forest.attribute(organ)?;
-                self.trees[organ].get_or_init(|| RiTree::new(attribute, self.forest.settings.parameters))
+    pub fn tree(&self, organ: usize) -> Option<&OrganTree<'a>> {
+        if self.trees[organ].get().is_none() {
+            if !self.forest.grows(organ) {
+                return None;
             }
-        };
-        tree.tick_to(self.now);
+            let tree = self.forest.new_tree(organ)?;
+            // Another thread may have been first.
+            let _ = self.trees[organ].set(tree);
+        }
+        let tree = self.trees[organ].get()?;
+        either!(tree, tree => tree.tick_to(self.now));
         Some(tree)
     }
 
     /// The chord of a segment that holds the body's box whole, as the tree of that body knows it. `Err` says why it is
-    /// to be traced; `Ok(None)` that it misses.
-    pub fn chord(&self, tree: &RiTree<ChordLength>, segment: &Segment) -> Result<Option<Interval>, Reason> {
+    /// to be traced; `Ok(None)` that it misses. Where a chord lies is known only in a forest that wants places.
+    pub fn chord(&self, tree: &OrganTree, segment: &Segment) -> Result<Option<Interval>, Reason> {
         let line = segment.line();
-        let attribute = tree.attribute();
-        let point = attribute.space().point_of(line);
-        match tree.query(point, &self.forest.cache) {
-            None | Some(Answer::Interpolated(None)) => Ok(None),
-            Some(Answer::Interpolated(Some(chord))) => Ok(attribute.stretch(chord, line, point)),
-            Some(Answer::Trace(reason)) => Err(reason),
+        match tree {
+            OrganTree::Quadrilinear(tree) => {
+                let attribute = tree.attribute();
+                let point = attribute.space().point_of(line);
+                match tree.query(point, &self.forest.cache) {
+                    None | Some(Answer::Interpolated(None)) => Ok(None),
+                    Some(Answer::Interpolated(Some(chord))) => Ok(attribute.stretch(chord, line, point)),
+                    Some(Answer::Trace(reason)) => Err(reason),
+                }
+            }
+            OrganTree::SquaredChord(tree) => {
+                let chords = tree.fit();
+                let Some((pair, stuv)) = chords.place_of(line) else { return Ok(None) };
+                let chord = |leaf: &_, _| chords.chord(leaf, line, pair, &stuv);
+                tree.ask(pair, &stuv, &self.forest.cache, chord).ok_or(Reason::Tolerance)
+            }
+        }
+    }
+
+    /// As [`chord`](Self::chord), its length alone, mm.
+    pub fn length_mm(&self, tree: &OrganTree, segment: &Segment) -> Result<f64, Reason> {
+        let OrganTree::SquaredChord(tree) = tree else {
+            return self.chord(tree, segment).map(|chord| chord.map_or(0.0, |chord| chord.length()));
+        };
+        let (line, chords) = (segment.line(), tree.fit());
+        let Some((pair, stuv)) = chords.place_of(line) else { return Ok(0.0) };
+        match tree.ask(pair, &stuv, &self.forest.cache, |leaf, _| chords.known(leaf, line, pair, &stuv)) {
+            Known::Miss => Ok(0.0),
+            Known::Length(length) => Ok(length),
+            Known::Nothing => Err(Reason::Tolerance),
+        }
+    }
+
+    /// Finds the lengths of a region of an image that the organ was made ready for.
+    pub fn find(&self, organ: usize, image: &ImageChords<'a>, region: &Region, found: &mut ImageLengths) {
+        match self.tree(organ) {
+            Some(OrganTree::SquaredChord(tree)) => image.find(tree, region, &self.forest.cache, found),
+            _ => found.open.extend(region.rows.clone().map(|row| (row, region.columns.clone()))),
         }
     }
 
@@ -218,7 +331,7 @@ impl<'a> Grove<'_, 'a> {
     /// how it is answered, with its part if the tree knows one; parts that are traced follow. `spans` comes and goes empty.
     pub fn chords(
         &self,
-        tree: &RiTree<ChordLength>,
+        tree: &OrganTree,
         body: &Body,
         rays: &[Segment],
         spans: &mut Spans,
@@ -241,9 +354,18 @@ impl<'a> Grove<'_, 'a> {
     }
 
     /// The depth of the cell that answers a line. `None` if the line passes the body's box by.
-    pub fn depth(&self, tree: &RiTree<ChordLength>, segment: &Segment) -> Option<u32> {
-        let point = tree.attribute().space().point_of(segment.line());
-        tree.query_with_depth(point, &self.forest.cache).map(|(_, depth)| depth)
+    pub fn depth(&self, tree: &OrganTree, segment: &Segment) -> Option<u32> {
+        let line = segment.line();
+        match tree {
+            OrganTree::Quadrilinear(tree) => {
+                let point = tree.attribute().space().point_of(line);
+                tree.query_with_depth(point, &self.forest.cache).map(|(_, depth)| depth)
+            }
+            OrganTree::SquaredChord(tree) => {
+                let (pair, stuv) = tree.fit().place_of(line)?;
+                Some(tree.ask(pair, &stuv, &self.forest.cache, |_, depth| depth))
+            }
+        }
     }
 }
 
@@ -266,12 +388,15 @@ mod tests {
     fn trees_share_one_clock_so_that_the_one_asked_last_is_the_newest() {
         let ball = || Body::new(ClosedMesh::new(icosphere(2)).expect("closed").0);
         let (often, once) = (ball(), ball());
-        let forest = Forest::new(vec![&often, &once], TreeSettings::default());
+        let parameters = Parameters::default();
+        let interpolation = Interpolation::Quadrilinear { parameters };
+        let settings = TreeSettings { interpolation, ..TreeSettings::default() };
+        let forest = Forest::new(vec![&often, &once], settings, false);
         let line = Line::new(DVec3::ZERO, UnitDir::new(DVec3::new(1.0, 0.2, 0.1)).expect("a direction"));
         let line = line.expect("finite");
         let newest = |organ: usize| {
             let grove = forest.enter();
-            let tree = grove.tree(organ).expect("a tree");
+            let Some(OrganTree::Quadrilinear(tree)) = grove.tree(organ) else { panic!("no tree") };
             let _ = tree.query(tree.attribute().space().point_of(&line), &forest.cache);
             let mut stamps = Vec::new();
             tree.collect_stamps(&mut stamps);

@@ -25,7 +25,7 @@ use crate::exact::Engine;
 use crate::geometry::Region;
 use crate::physics::{Attenuator, PhotonNoise};
 use crate::scene::{Scene, View};
-pub use forest::{ForestReport, QueryCounts, TreeSettings};
+pub use forest::{DEFAULT_TOLERANCE_MM, ForestReport, Interpolation, QueryCounts, TreeSettings};
 
 use forest::Forest;
 use tile::TileTracer;
@@ -113,7 +113,7 @@ impl<'a> Projector<'a> {
         let bodies = || scene.organs.iter().map(|organ| &organ.body).collect();
         let (engine, forest) = match method {
             Method::Exact(engine) => (engine, None),
-            Method::RiTree(settings) => (None, Some(Forest::new(bodies(), settings))),
+            Method::RiTree(settings) => (None, Some(Forest::new(bodies(), settings, wanted.colour))),
         };
         Ok(Self { scene, attenuator, noise, wanted, traced, engine, forest })
     }

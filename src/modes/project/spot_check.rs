@@ -31,8 +31,7 @@ impl Projector<'_> {
                 let Some(tree) = grove.tree(organ).filter(|_| holds_box(&ray, &body.bounds())) else {
                     continue;
                 };
-                let Ok(chord) = grove.chord(tree, &ray) else { continue };
-                let near = chord.map_or(0.0, |c| c.length());
+                let Ok(near) = grove.length_mm(tree, &ray) else { continue };
                 let mut length_by = |find: &dyn Fn(&mut Vec<Interval>)| -> f64 {
                     find(&mut parts);
                     parts.iter().map(Interval::length).sum()

@@ -2,15 +2,14 @@
 
 use rayon::prelude::*;
 
-use super::forest::{Forest, Grove, QueryCounts, holds_box};
+use super::forest::{Forest, Grove, OrganTree, QueryCounts, holds_box};
 use super::sweep::own_stretches;
 use super::{Found, Projector, RayCounts, Tile};
-use crate::attributes::chord::ChordLength;
+use crate::attributes::squared_chord::{ImageChords, ImageLengths, places_of};
 use crate::exact::{BodyView, Engine, Lengths, Spans};
 use crate::geometry::{Interval, Region, Segment};
 use crate::physics::composite::composite;
 use crate::physics::{Appearance, RowMass};
-use crate::ritree::RiTree;
 use crate::scene::{Frustum, Organ, View};
 
 /// Traces tiles of one view.
@@ -21,6 +20,8 @@ pub struct TileTracer<'a, 's> {
     appearances: Vec<Appearance>,
     /// The organs ready for the view's rays, by index; those that are needed and not put in a tree.
     bodies: Vec<Option<BodyView<'a>>>,
+    /// The organs in trees that find a view's rays in runs.
+    images: Vec<Option<ImageChords<'s>>>,
 }
 
 /// The chords of one organ along the rays of a tile.
@@ -52,7 +53,7 @@ impl TileWork {
     }
 
     /// The tree's answer. `None` if the ray is to be traced.
-    fn ask(&mut self, grove: &Grove, tree: &RiTree<ChordLength>, ray: &Segment) -> Option<Option<Interval>> {
+    fn ask(&mut self, grove: &Grove, tree: &OrganTree, ray: &Segment) -> Option<Option<Interval>> {
         self.queries.queries += 1;
         match grove.chord(tree, ray) {
             Ok(chord) => {
@@ -76,8 +77,14 @@ impl<'a, 's> TileTracer<'a, 's> {
             is_needed.then(|| it.body.view(view.rays(), projector.engine))
         };
         let bodies = organs.par_iter().enumerate().map(ready).collect();
+        let in_runs = |organ: usize| {
+            let forest =
+                projector.forest.as_ref().filter(|_| projector.traced.binary_search(&organ).is_ok())?;
+            forest.image(organ, view.rays())
+        };
+        let images = (0..organs.len()).into_par_iter().map(in_runs).collect();
         let appearances = organs.iter().map(|o| o.appearance).collect();
-        Self { projector, view, view_index, appearances, bodies }
+        Self { projector, view, view_index, appearances, bodies, images }
     }
 
     /// The engine of each organ that is ready.
@@ -99,15 +106,20 @@ impl<'a, 's> TileTracer<'a, 's> {
         let mut rays = Vec::new();
         if grove.is_some() && !touched.is_empty() {
             work.found = vec![Found::Nothing; region.pixels()];
-            rays = region.places().map(|(c, r)| self.view.segment(c, r)).collect();
+            if touched.iter().any(|&organ| self.images[organ].is_none()) {
+                rays = region.places().map(|(c, r)| self.view.segment(c, r)).collect();
+            }
         }
         let mut organs: Vec<OrganChords> = touched
             .iter()
             .map(|&organ| {
                 let tree = grove.as_ref().and_then(|grove| Some((grove, grove.tree(organ)?)));
-                let lengths = match tree {
-                    Some((grove, tree)) => self.interpolate(organ, grove, tree, &rays, &mut work),
-                    None => self.trace_exactly(organ, &region, &mut work),
+                let lengths = match (tree, &self.images[organ]) {
+                    (Some((grove, _)), Some(image)) => {
+                        self.find_in_runs(organ, grove, image, &region, &mut work)
+                    }
+                    (Some((grove, tree)), None) => self.interpolate(organ, grove, tree, &rays, &mut work),
+                    (None, _) => self.trace_exactly(organ, &region, &mut work),
                 };
                 OrganChords { organ, own: lengths.clone(), lengths }
             })
@@ -165,12 +177,55 @@ impl<'a, 's> TileTracer<'a, 's> {
         lengths
     }
 
+    /// The lengths of a tile's rays in one organ by its tree, run by run, mm; what the tree does not know is traced.
+    fn find_in_runs(
+        &self,
+        organ: usize,
+        grove: &Grove<'_, 's>,
+        image: &ImageChords<'s>,
+        region: &Region,
+        work: &mut TileWork,
+    ) -> Vec<f64> {
+        let mut lengths = vec![0.0; region.pixels()];
+        let mut middles = vec![0.0; if work.per_ray.is_empty() { 0 } else { region.pixels() }];
+        let mut open = Vec::new();
+        let wanted = (!middles.is_empty()).then_some(&mut middles[..]);
+        let mut found = ImageLengths { lengths: &mut lengths, middles: wanted, open: &mut open };
+        grove.find(organ, image, region, &mut found);
+        for (found, _) in work.found.iter_mut().zip(&lengths).filter(|(_, length)| **length > 0.0) {
+            *found = (*found).max(Found::Interpolated);
+        }
+        let parts = work.per_ray.iter_mut().zip(&middles).zip(&lengths);
+        for ((all, middle), length) in parts {
+            let part = Interval::new(middle - 0.5 * length, middle + 0.5 * length);
+            all.extend(part.filter(|part| part.length() > 0.0).map(|part| (organ, part)));
+        }
+        let mut traced = 0;
+        for run in &open {
+            let (run, at) = places_of(region, run);
+            traced += at.len() as u64;
+            work.found[at.clone()].fill(Found::Traced);
+            let sums = Lengths(&mut lengths[at.clone()]);
+            if work.per_ray.is_empty() {
+                image.exact().trace(&run, &mut { sums });
+                continue;
+            }
+            image.exact().trace(&run, &mut (sums, &mut work.spans));
+            let per_ray = &mut work.per_ray[at];
+            work.spans.drain(|ray, part| per_ray[ray].push((organ, part)));
+        }
+        work.queries.queries += region.pixels() as u64;
+        work.queries.interpolated += region.pixels() as u64 - traced;
+        work.queries.traced_tolerance += traced;
+        lengths
+    }
+
     /// The lengths of a tile's rays in one organ by its tree, mm; what the tree does not know is traced.
     fn interpolate(
         &self,
         organ: usize,
         grove: &Grove,
-        tree: &RiTree<ChordLength>,
+        tree: &OrganTree,
         rays: &[Segment],
         work: &mut TileWork,
     ) -> Vec<f64> {

@@ -6,6 +6,7 @@ use super::definitions::definitions;
 use super::panels::Panel;
 use crate::modes::audit::{AuditReport, Bar, KindFigures, OrganFigures};
 use crate::modes::figures::Figures;
+use crate::modes::project::Interpolation;
 use crate::output::page::plot::{Form, Plot, Series, decade_name};
 use crate::output::page::{BLACK, BLUE, GREY, ORANGE, document, escape, grouped, short};
 
@@ -29,11 +30,14 @@ pub fn page(report: &AuditReport, panels: &[Panel]) -> String {
 /// What was compared with what.
 fn what(report: &AuditReport) -> String {
     let seed = report.rays.seed.map(|seed| format!(", seed {seed}")).unwrap_or_default();
-    let trees = report.trees.map_or(String::new(), |trees| {
-        format!(
-            " (distance threshold {}, depth {} at most)",
-            trees.parameters.distance_threshold, trees.parameters.max_depth
-        )
+    let trees = report.trees.map_or(String::new(), |trees| match trees.interpolation {
+        Interpolation::Quadrilinear { parameters } => format!(
+            " (quadrilinear, distance threshold {}, depth {} at most)",
+            parameters.distance_threshold, parameters.max_depth
+        ),
+        Interpolation::SquaredChord { tolerance_mm } => {
+            format!(" (squared chords, tolerance {tolerance_mm} mm)")
+        }
     });
     format!(
         "<p class=\"lead\"><b>{}</b>{trees} against <b>{}</b>, along {}{seed}: {} rays. Lengths are in mm; \

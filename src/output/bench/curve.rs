@@ -39,25 +39,27 @@ fn sizes(report: &CurveReport) -> Vec<[u32; 2]> {
     sizes
 }
 
-/// Mean error over time, a curve for each method; exact methods lie on the line of what counts as none.
+/// Mean error over time, a curve for each method and kind of setting; exact methods lie on the line of what counts as none.
 fn plot(report: &CurveReport, pixels: [u32; 2], time: Time, is_cold: bool) -> Curves<'static> {
-    let mut methods: Vec<&'static str> = report.rows.iter().map(|row| row.method).collect();
-    let mut seen = Vec::new();
-    methods.retain(|m| {
-        !seen.contains(m) && {
-            seen.push(*m);
-            true
+    let kind = |row: &CurveRow| match row.setting {
+        Some(dial) => format!("{} --{}", row.method, dial.option),
+        None => row.method.to_owned(),
+    };
+    let mut kinds: Vec<String> = Vec::new();
+    for row in &report.rows {
+        if !kinds.contains(&kind(row)) {
+            kinds.push(kind(row));
         }
-    });
-    let curve = |(i, method): (usize, &&'static str)| {
-        let own = report.rows.iter().filter(|row| row.pixels == pixels && row.method == *method);
+    }
+    let curve = |(i, name): (usize, &String)| {
+        let own = report.rows.iter().filter(|row| row.pixels == pixels && kind(row) == *name);
         let point = |row: &CurveRow| Point {
             x: time(row).seconds,
             y: row.error_mm.mean.max(EXACT_BELOW_MM),
             name: row.options.clone(),
         };
         Curve {
-            name: (*method).into(),
+            name: name.clone(),
             colour: COLOURS[i % COLOURS.len()],
             points: own.map(point).collect(),
             dashed: false,
@@ -69,7 +71,7 @@ fn plot(report: &CurveReport, pixels: [u32; 2], time: Time, is_cold: bool) -> Cu
             spacing: Spacing::Logarithmic,
         },
         up: Axis { name: "mean error, mm (1e-6: exact)", spacing: Spacing::Logarithmic },
-        curves: methods.iter().enumerate().map(curve).collect(),
+        curves: kinds.iter().enumerate().map(curve).collect(),
     }
 }
 

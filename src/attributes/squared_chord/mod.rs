@@ -1,0 +1,201 @@
+//! The squared chord: smooth where the chord itself is steep.
+//!
+//! ```text
+//!    L ▲   ╭────╮         L² ▲    ╭──╮          A chord's length falls to zero with an infinite slope at the outline of
+//!      │  │      │           │   ╱    ╲         a smooth body, its square with a finite one, and smoothly beyond. So the
+//!      │  │      │           │  ╱      ╲        square is fitted, and the root taken at the end.
+//!      └──┴──────┴──▶        └─╱────────╲──▶
+//! ```
+//!
+//! Lines are given by their intercepts in a frame in which the body is about a ball (`LineFrame`). There, with λ from 0 to 1
+//! between the planes, d the line's part between them and b its distance from the middle of a ball of radius r,
+//!
+//!   F = |d|⁴ (λ_out − λ_in)² = 4 |d|² (r² − b²)
+//!
+//! is a polynomial of degree 4 with small higher terms for an ellipsoid, and nearly one for a body that is like
+//! an ellipsoid. A cell's F is one cubic, fitted to exact chords of the lines that hit.
+//!
+//! **The error.** Other lines, which take no part in the fit, say how far F may be off: by δ. The length L = √F · |d in mm| / |d|²
+//! is then off by about δ |d in mm| / (2 |d|² √F). Where that exceeds the tolerance, F is below the leaf's threshold and the
+//! line is traced exactly: a narrow band along the outline. So one number, a length in mm, says where cells are split, which
+//! lines are traced, and how good the others are.
+//!
+//! **What is proved.** That a cell is empty, and that a pixel lies beyond the body's outline. A line of a cell that some lines
+//! hit is never taken to miss: it is known, or traced.
+
+mod cubic;
+mod fit;
+mod image;
+mod outline;
+#[cfg(test)]
+mod tests;
+
+use glam::DVec3;
+
+use crate::exact::{Body, Engine};
+use crate::geometry::{Interval, Line};
+use crate::linespace::{LineFrame, PlanePair, is_in_range, squared_span};
+use cubic::Cubic;
+pub use image::{ImageChords, ImageLengths, Run, places_of};
+
+/// Fits the squared chord of one convex body.
+pub struct SquaredChord<'a> {
+    body: &'a Body,
+    engine: Engine,
+    frame: LineFrame,
+    tolerance_mm: f64,
+    wants_places: bool,
+    first_level: u32,
+    /// The error of F that facets make, which no split mends.
+    noise: f64,
+    /// Whether facets or edges leave next to nothing to be known within the tolerance.
+    is_hopeless: bool,
+}
+
+/// What answers the lines of a final cell.
+#[derive(Clone, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "nearly all leaves are models, and the tree boxes each")]
+pub enum ChordLeaf {
+    /// No line meets the body, proved.
+    Empty,
+    /// All lines are traced.
+    Traced,
+    /// F is known, where it is not below a threshold.
+    Model(ChordModel),
+}
+
+/// F in one cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChordModel {
+    centre: [f64; 4],
+    /// From intercepts about the centre to the cell's local coordinates.
+    scale: f64,
+    cubic: Cubic,
+    /// Lines with smaller F are traced.
+    threshold: f64,
+    /// |d|² times λ in the middle of the chord, where places are wanted.
+    middle: Option<Box<Cubic>>,
+}
+
+impl ChordModel {
+    #[inline(always)]
+    fn local(&self, stuv: &[f64; 4]) -> [f64; 4] {
+        std::array::from_fn(|a| (stuv[a] - self.centre[a]) * self.scale)
+    }
+
+    #[inline(always)]
+    fn at(&self, stuv: &[f64; 4]) -> f64 {
+        self.cubic.at(&self.local(stuv)) + quartic(stuv)
+    }
+}
+
+/// The part of F that no cubic has, if the body is a ball in the frame: of 4 |d|² (r² − b²), where |d|² b² is the squared
+/// moment of the line about the middle of the cube.
+#[inline(always)]
+fn quartic(stuv: &[f64; 4]) -> f64 {
+    let [s, t, u, v] = stuv.map(|x| x - 0.5);
+    let across = s * v - t * u;
+    -4.0 * (across * across)
+}
+
+/// What is known of a line without tracing it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Known {
+    /// It misses, proved.
+    Miss,
+    /// The length of its chord, mm.
+    Length(f64),
+    /// Nothing: it is to be traced.
+    Nothing,
+}
+
+impl<'a> SquaredChord<'a> {
+    /// The chords of `body` to within `tolerance_mm`; with `wants_places`, also where they lie. `None` if the body is not
+    /// convex, or too flat to have a frame.
+    pub fn new(body: &'a Body, tolerance_mm: f64, wants_places: bool) -> Option<Self> {
+        let (middle, to_ball) = body.walker()?.ball_frame();
+        // The ball's radius is 1: a hundredth more does no harm.
+        let reach = |axis: DVec3| {
+            let normal = to_ball.transpose() * axis;
+            body.surface().height_bound(normal, middle, 0.0, 0.01).0
+        };
+        let high = DVec3::new(reach(DVec3::X), reach(DVec3::Y), reach(DVec3::Z));
+        let low = -DVec3::new(reach(-DVec3::X), reach(-DVec3::Y), reach(-DVec3::Z));
+        let frame = LineFrame::new(middle, to_ball, low, high)?;
+        let engine = body.engine_for_rays();
+        let fitter = Self {
+            body,
+            engine,
+            frame,
+            tolerance_mm,
+            wants_places,
+            first_level: 0,
+            noise: 0.0,
+            is_hopeless: false,
+        };
+        Some(fitter.with_first_level())
+    }
+
+    /// The frame of its lines.
+    pub fn frame(&self) -> &LineFrame {
+        &self.frame
+    }
+
+    /// The line's place among the leaves. `None` if it passes the body's box by.
+    #[inline]
+    pub fn place_of(&self, line: &Line) -> Option<(PlanePair, [f64; 4])> {
+        let (o, d) = (self.frame.point(line.origin()), self.frame.vector(line.dir()));
+        let axis = LineFrame::dominant(d);
+        let stuv = LineFrame::intercepts(axis, o, d);
+        // What overflowed is in no range, but that proves no miss.
+        (is_in_range(&stuv) || stuv.iter().any(|x| !x.is_finite())).then_some((LineFrame::pair(axis), stuv))
+    }
+
+    /// What a leaf knows of a line at `stuv`.
+    #[inline]
+    pub fn known(&self, leaf: &ChordLeaf, line: &Line, pair: PlanePair, stuv: &[f64; 4]) -> Known {
+        match leaf {
+            ChordLeaf::Empty => Known::Miss,
+            ChordLeaf::Traced => Known::Nothing,
+            ChordLeaf::Model(model) => {
+                let f = model.at(stuv);
+                // Written so that NaN is traced.
+                if f >= model.threshold {
+                    // |d in mm| is 1 over what the line's direction advances from plane to plane.
+                    let [k, ..] = pair.axes();
+                    let advance = self.frame.advance(k, line.dir()).abs();
+                    Known::Length(f.sqrt() / (squared_span(stuv) * advance))
+                } else {
+                    Known::Nothing
+                }
+            }
+        }
+    }
+
+    /// Where along a line the middle of its chord lies, mm from the line's origin. `None` if the leaf does not know.
+    pub fn middle_mm(&self, leaf: &ChordLeaf, line: &Line, pair: PlanePair, stuv: &[f64; 4]) -> Option<f64> {
+        let ChordLeaf::Model(model) = leaf else { return None };
+        let middle = model.middle.as_ref()?.at(&model.local(stuv)) / squared_span(stuv);
+        let [k, ..] = pair.axes();
+        Some((middle - self.frame.point(line.origin())[k]) / self.frame.vector(line.dir())[k])
+    }
+
+    /// As [`known`](Self::known), as a part of the line; of no length if it misses. `None` if the line is to be traced.
+    pub fn chord(
+        &self,
+        leaf: &ChordLeaf,
+        line: &Line,
+        pair: PlanePair,
+        stuv: &[f64; 4],
+    ) -> Option<Option<Interval>> {
+        match self.known(leaf, line, pair, stuv) {
+            Known::Miss => Some(None),
+            Known::Nothing => None,
+            Known::Length(length) => {
+                // Without places, a chord is as good anywhere.
+                let middle = self.middle_mm(leaf, line, pair, stuv).unwrap_or(0.5 * length);
+                Some(Interval::new(middle - 0.5 * length, middle + 0.5 * length).filter(|c| c.length() > 0.0))
+            }
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! The line space of a body's own frame: an affine map under which the body is about a ball.
+//!
+//! Ratios along a line are kept by affine maps, so that the share of the way between two planes at which a line enters a body
+//! is the same in the frame and in the world.
+
+use glam::{DAffine3, DMat3, DVec3};
+
+use super::PlanePair;
+
+/// An affine map between the world and the unit cube that holds a body; the planes of a pair are the cube's faces across
+/// an axis. Lines are taken from the plane at 0 to the plane at 1, whichever way they run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LineFrame {
+    to_unit: DAffine3,
+    from_unit: DAffine3,
+}
+
+impl LineFrame {
+    /// The frame whose map from mm about `middle` is `to_ball`, turned no further, scaled alike in all directions and moved
+    /// so that the box [`low`, `high`] of that map is in the middle of the unit cube. `None` if something is not finite, or
+    /// flat.
+    pub fn new(middle: DVec3, to_ball: DMat3, low: DVec3, high: DVec3) -> Option<Self> {
+        let largest = (high - low).max_element();
+        let scale = 1.0 / largest;
+        let matrix = scale * to_ball;
+        let centre = scale * 0.5 * (low + high);
+        let to_unit = DAffine3 { matrix3: matrix, translation: 0.5 - centre - matrix * middle };
+        let from_unit = to_unit.inverse();
+        (largest > 0.0 && to_unit.is_finite() && from_unit.is_finite()).then_some(Self { to_unit, from_unit })
+    }
+
+    /// A point of the world, mm, in the frame.
+    #[inline]
+    pub fn point(&self, p: DVec3) -> DVec3 {
+        self.to_unit.transform_point3(p)
+    }
+
+    /// A vector of the world, mm, in the frame.
+    #[inline]
+    pub fn vector(&self, v: DVec3) -> DVec3 {
+        self.to_unit.transform_vector3(v)
+    }
+
+    /// One component of a vector of the world, mm, in the frame.
+    #[inline]
+    pub fn advance(&self, axis: usize, v: DVec3) -> f64 {
+        self.to_unit.matrix3.row(axis).dot(v)
+    }
+
+    /// A point of the frame in the world, mm.
+    pub fn point_mm(&self, p: DVec3) -> DVec3 {
+        self.from_unit.transform_point3(p)
+    }
+
+    /// The vector whose product with a way in the world, mm, is that of `normal` with the way in the frame.
+    pub fn normal_mm(&self, normal: DVec3) -> DVec3 {
+        self.to_unit.matrix3.transpose() * normal
+    }
+
+    /// The axis along which a direction of the frame is dominant; equal components go to the earlier axis.
+    #[inline]
+    pub fn dominant(d: DVec3) -> usize {
+        let a = d.abs();
+        if a.x >= a.y && a.x >= a.z { 0 } else { 1 + usize::from(a.z > a.y) }
+    }
+
+    /// The plane pair of an axis.
+    #[inline]
+    pub fn pair(axis: usize) -> PlanePair {
+        PlanePair::ALL[2 * axis]
+    }
+
+    /// Where the line through `o` along `d`, both of the frame, meets the planes of the pair of `axis`.
+    #[inline]
+    pub fn intercepts(axis: usize, o: DVec3, d: DVec3) -> [f64; 4] {
+        let [k, i, j] = [axis, (axis + 1) % 3, (axis + 2) % 3];
+        let inverse = 1.0 / d[k];
+        let (slope_i, slope_j) = (d[i] * inverse, d[j] * inverse);
+        let (s, t) = (o[i] - o[k] * slope_i, o[j] - o[k] * slope_j);
+        [s, t, s + slope_i, t + slope_j]
+    }
+
+    /// The places of a line's two intercepts, mm.
+    pub fn ends(&self, axis: usize, [s, t, u, v]: [f64; 4]) -> [DVec3; 2] {
+        let place = |plane: f64, across: [f64; 2]| {
+            let mut p = DVec3::ZERO;
+            p[axis] = plane;
+            p[(axis + 1) % 3] = across[0];
+            p[(axis + 2) % 3] = across[1];
+            self.from_unit.transform_point3(p)
+        };
+        [place(0.0, [s, t]), place(1.0, [u, v])]
+    }
+}
+
+/// The squared length, in the frame, of the part of a line between its planes.
+#[inline]
+pub fn squared_span([s, t, u, v]: &[f64; 4]) -> f64 {
+    1.0 + (u - s) * (u - s) + (v - t) * (v - t)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_and_its_intercepts_are_the_same_line() {
+        let to_ball = DMat3::from_rotation_y(0.3) * DMat3::from_diagonal(DVec3::new(0.01, 0.3, 2.0));
+        let frame = LineFrame::new(
+            DVec3::new(5.0, -40.0, 7.0),
+            to_ball,
+            DVec3::splat(-1.0),
+            DVec3::new(1.0, 0.9, 0.5),
+        )
+        .expect("not flat");
+        for (o, d) in [(DVec3::new(9.0, 3.0, -2.0), DVec3::X), (DVec3::ZERO, DVec3::new(-0.2, 0.9, 0.4))] {
+            let (o_unit, d_unit) = (frame.point(o), frame.vector(d));
+            let axis = LineFrame::dominant(d_unit);
+            let [start, end] = frame.ends(axis, LineFrame::intercepts(axis, o_unit, d_unit));
+            for place in [start, end] {
+                let off = (place - o).cross(d).length() / d.length();
+                assert!(off < 1e-9 * place.distance(o).max(1.0), "{off}");
+            }
+        }
+    }
+}
