@@ -133,13 +133,16 @@ impl SceneText {
     }
 }
 
-fn shortened(mut message: String) -> String {
-    if message.len() > LONGEST_MESSAGE {
-        let end = (0..=LONGEST_MESSAGE).rev().find(|&end| message.is_char_boundary(end));
-        message.truncate(end.unwrap_or(0));
-        message.push('…');
+/// The beginning and the end: what is wrong is said in one, what it is in the other.
+fn shortened(message: String) -> String {
+    if message.len() <= LONGEST_MESSAGE {
+        return message;
     }
-    message
+    let half = LONGEST_MESSAGE / 2;
+    let is_end = |at: &usize| message.is_char_boundary(*at);
+    let end = (0..=half).rev().find(is_end).unwrap_or(0);
+    let start = (message.len() - half..message.len()).find(is_end).unwrap_or(message.len());
+    format!("{} … {}", &message[..end], &message[start..])
 }
 
 #[cfg(test)]
