@@ -1,3 +1,6 @@
 //! Attributes of lines that RI-trees hold.
 
 pub mod chord;
+pub mod exit_ray;
+pub mod lines;
+pub mod surface;

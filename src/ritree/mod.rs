@@ -32,6 +32,7 @@ pub use cache::{Cache, oldest_to_keep};
 pub use cell::Reason;
 pub use stats::{BuildCounts, TreeShape};
 
+use crate::geometry::Real;
 use crate::linespace::{LinePoint, PlanePair, is_in_range};
 use cell::{Kind, Place, Verdict, quadrilinear};
 use node::{Leaf, Node};
@@ -124,7 +125,7 @@ impl<A: Attribute> RiTree<A> {
                 }
             }
             let Some(halves) = node.halves() else { continue };
-            let side = place.side_of(&line.stuv);
+            let side = place.side_of::<A::Real>(&line.stuv);
             (node, place) = (&halves[side], place.half(side));
         }
     }
@@ -159,7 +160,7 @@ impl<A: Attribute> RiTree<A> {
                     return (self.answer(&place, &Leaf::new(kind, corners, 0), stuv), place.depth);
                 }
                 Verdict::Split => {
-                    let side = place.side_of(&stuv);
+                    let side = place.side_of::<A::Real>(&stuv);
                     let [lower, upper] = self.split(&place, &corners);
                     corners = if side == 0 { lower } else { upper };
                     place = place.half(side);
@@ -174,7 +175,7 @@ impl<A: Attribute> RiTree<A> {
         match leaf.kind() {
             Kind::Empty => Answer::Interpolated(corners[0].clone()),
             Kind::Smooth => {
-                let fractions = place.cell.fractions(&stuv);
+                let fractions = place.cell.fractions(&stuv.map(A::Real::of));
                 Answer::Interpolated(quadrilinear(&self.attribute, corners, fractions))
             }
             Kind::TwoClasses => {
