@@ -25,6 +25,7 @@ mod regular_file;
 mod schema;
 pub mod shape;
 mod text;
+pub mod trace;
 mod view;
 
 use crate::error::Result;
