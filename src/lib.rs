@@ -10,12 +10,13 @@
 //!                frames)  convex?)    bvh)   ritree<Attribute> ◄── linespace (s, t, u, v)
 //!                                       │    │ queries
 //!                                       ▼    ▼
-//!                                  modes: project, audit ─► output (images, records, reports)
+//!                                  modes: project, audit, raytrace ─► output (images, records, reports)
 //! ```
 //!
-//! The picture shows the way of the data. Imports run from the parts to the whole: `geometry` knows no room, `exact` and
-//! `linespace` know geometry, `ritree` lines and cells only, `attributes` join it with `exact`; a `scene` is made of
-//! bodies that `geometry` and `exact` have proved, and of `physics`; `modes` use all of these, `output` writes what modes
+//! The picture shows the way of the data. Imports run from the parts to the whole: `geometry` knows no room, `exact`,
+//! `surface` and `linespace` know geometry, `ritree` lines and cells only, `attributes` join it with `exact` and
+//! `surface`; a `scene` is made of bodies that `geometry` and `exact` have proved, and of `physics` (one to be rendered,
+//! of `surface`s); `modes` use all of these, `output` writes what modes
 //! return, `cli` calls both. Lengths are mm, angles degrees, energies keV, densities g/cm³, attenuation
 //! coefficients cm⁻¹; points are in the patient's LPS frame (+x left, +y back, +z head).
 //!
@@ -45,5 +46,6 @@ pub mod output;
 pub mod physics;
 pub mod ritree;
 pub mod scene;
+pub mod surface;
 
 pub use error::{Error, Result};

@@ -2,6 +2,7 @@
 
 mod audit;
 mod bench;
+mod trace;
 
 use std::path::PathBuf;
 
@@ -11,6 +12,7 @@ use crate::output::png::Polarity;
 use crate::physics::DetectorResponse;
 pub use audit::{AuditArgs, RayArgs};
 pub use bench::{BenchCommand, CurveArgs, RunArgs, ScaleArgs};
+pub use trace::TraceArgs;
 
 /// Exact intersection lengths of rays with organs: projection images of phantoms, with their numbers.
 ///
@@ -42,6 +44,8 @@ pub enum Command {
     /// Run time against error on your scene and machine: which method and setting to use.
     #[command(subcommand)]
     Bench(BenchCommand),
+    /// Render a scene of smooth, mirroring and refracting objects, exactly or by RI-trees.
+    Trace(Box<TraceArgs>),
     /// Say whether scenes or mesh files can be projected, and if not, what to do about it.
     Check(CheckArgs),
     /// The phantoms that come with the program.

@@ -6,6 +6,7 @@ mod control;
 pub mod figures;
 pub mod oracles;
 pub mod project;
+pub mod raytrace;
 pub mod reference;
 
 pub use control::Control;

@@ -5,6 +5,7 @@
 //! Scene      ─► phantom    ─► obj
 //! AuditReport ─► audit     ─► page: html · csv
 //! CurveReport, ScaleReport ─► bench ─► page: html · svg, csv
+//! Picture    ─► picture    ─► png
 //! any record ─► json
 //!                  └─► atomic: temporary file beside the target ─► flush ─► sync ─► rename
 //! ```
@@ -19,6 +20,7 @@ pub mod npy;
 pub mod obj;
 pub mod page;
 pub mod phantom;
+pub mod picture;
 pub mod png;
 pub mod projection;
 pub mod sidecar;
