@@ -21,6 +21,7 @@ impl ClosestApproach {
 
 impl Attribute for ClosestApproach {
     type Output = f64;
+    type Real = f64;
 
     fn sample(&self, line: LinePoint) -> f64 {
         self.space.line_of(line).map_or(f64::NAN, |line| self.of(&line))

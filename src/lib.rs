@@ -10,14 +10,15 @@
 //!                frames)  convex?)    bvh)   ritree<Attribute> ◄── linespace (s, t, u, v)
 //!                                       │    │ queries
 //!                                       ▼    ▼
-//!                     study ─► modes: project, audit, dose ─► output (images, tables, records, reports)
+//!                     study ─► modes: project, audit, dose, raytrace, bench ─► output (images, tables, records, reports)
 //! ```
 //!
-//! The picture shows the way of the data. Imports run from the parts to the whole: `geometry` knows no room, `exact` and
-//! `linespace` know geometry, `ritree` lines and cells only, `attributes` join it with `exact`; a `scene` is made of
-//! bodies that `geometry` and `exact` have proved, and of `physics`; a `study` is numbered paths through scenes; `modes`
-//! use all of these, `output` writes what modes return, `cli` calls both. Lengths are mm, angles degrees, energies keV,
-//! densities g/cm³, attenuation coefficients cm⁻¹; points are in the patient's LPS frame (+x left, +y back, +z head).
+//! The picture shows the way of the data. Imports run from the parts to the whole: `geometry` knows no room, `exact`,
+//! `surface` and `linespace` know geometry, `ritree` lines and cells only, `attributes` join it with `exact` and
+//! `surface`; a `scene` is made of bodies that `geometry` and `exact` have proved, and of `physics` (one to be rendered,
+//! of `surface`s); a `study` is numbered paths through scenes; `modes` use all of these, `output` writes what modes return,
+//! `cli` calls both. Lengths are mm, angles degrees, energies keV, densities g/cm³, attenuation coefficients cm⁻¹; points
+//! are in the patient's LPS frame (+x left, +y back, +z head).
 //!
 //! ```
 //! use chordfield::modes::{Control, project::{Method, Projector, Wanted}};
@@ -46,5 +47,6 @@ pub mod physics;
 pub mod ritree;
 pub mod scene;
 pub mod study;
+pub mod surface;
 
 pub use error::{Error, Result};

@@ -13,7 +13,7 @@ pub mod image;
 
 use glam::DVec3;
 
-use crate::geometry::{Bounds, Line, UnitDir};
+use crate::geometry::{Bounds, Line, Ray, Real, UnitDir, Vec3};
 pub use frame::{LineFrame, squared_span};
 
 /// The least and greatest intercept of a line through the box.
@@ -121,6 +121,42 @@ impl LineSpace {
         LinePoint { pair, stuv: [s, t, u, v] }
     }
 
+    /// The pair of a ray's dominant direction; as [`point_of`](Self::point_of) finds it.
+    pub fn pair_of<R: Real>(&self, dir: Vec3<R>) -> PlanePair {
+        let d = Vec3::new(dir.x / R::of(self.size.x), dir.y / R::of(self.size.y), dir.z / R::of(self.size.z));
+        let a = [d.x.abs(), d.y.abs(), d.z.abs()];
+        let axis = if a[0] >= a[1] && a[0] >= a[2] { 0 } else { 1 + u8::from(a[2] > a[1]) };
+        PlanePair { axis, reversed: d.axis(usize::from(axis)).get() < 0.0 }
+    }
+
+    /// Where a ray's line meets the planes of a pair, whatever its own: s, t, u, v. Not finite if it runs along them.
+    pub fn intercepts<R: Real>(&self, ray: &Ray<R>, pair: PlanePair) -> [R; 4] {
+        let [k, i, j] = pair.axes();
+        let along = |axis: usize| (ray.origin.axis(axis) - R::of(self.min[axis])) / R::of(self.size[axis]);
+        let slope = |axis: usize| ray.dir.axis(axis) / R::of(self.size[axis]);
+        let (o, d) = ([along(i), along(j)], [slope(i), slope(j)]);
+        let (front, back) = if pair.reversed { (1.0, 0.0) } else { (0.0, 1.0) };
+        let (height, over) = (along(k), R::of(1.0) / slope(k));
+        let at = |plane: f64| (R::of(plane) - height) * over;
+        let (first, second) = (at(front), at(back));
+        [o[0] + first * d[0], o[1] + first * d[1], o[0] + second * d[0], o[1] + second * d[1]]
+    }
+
+    /// The ray from the front plane through two intercepts; as [`line_of`](Self::line_of) finds it.
+    pub fn ray_of<R: Real>(&self, pair: PlanePair, [s, t, u, v]: [R; 4]) -> Ray<R> {
+        let [k, i, j] = pair.axes();
+        let (front, back) = if pair.reversed { (1.0, 0.0) } else { (0.0, 1.0) };
+        let place = |plane: f64, across: [R; 2]| {
+            let mut p = [R::of(plane); 3];
+            p[i] = across[0];
+            p[j] = across[1];
+            p[k] = R::of(plane);
+            Vec3::of(self.min) + Vec3::new(p[0], p[1], p[2]).scaled(Vec3::of(self.size))
+        };
+        let (start, end) = (place(front, [s, t]), place(back, [u, v]));
+        Ray { origin: start, dir: (end - start).normalized() }
+    }
+
     /// The line through the two intercepts, from the front plane on; its origin lies on the front plane.
     ///
     /// `None` only where a box is so small or so far off that the two planes round to one.
@@ -186,8 +222,8 @@ impl Cell {
     }
 
     /// Where the point lies between low (0) and high (1) on each axis.
-    pub fn fractions(&self, stuv: &[f64; 4]) -> [f64; 4] {
-        std::array::from_fn(|a| (stuv[a] - self.low[a]) / (self.high[a] - self.low[a]))
+    pub fn fractions<R: Real>(&self, stuv: &[R; 4]) -> [R; 4] {
+        std::array::from_fn(|a| (stuv[a] - R::of(self.low[a])) / (R::of(self.high[a]) - R::of(self.low[a])))
     }
 }
 

@@ -562,3 +562,31 @@ fn a_broken_limit_exits_1_and_names_the_worst_ray_which_its_command_finds_again(
         assert!(err(&run).contains(words), "{bad:?}: {}", err(&run));
     }
 }
+
+#[test]
+fn tracing_writes_a_picture_its_map_and_a_record_that_tells_the_error() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let small = ["trace", "random-volumes", "--count", "3", "--seed", "2", "--size", "40x30", "-o", "out"];
+    let run = chordfield(
+        folder.path(),
+        &[&small[..], &["--map", "--compare", "--json", "--samples", "4"]].concat(),
+    );
+    let record = summary(&run);
+    assert!(record["exact"]["mean_rgb_error"].as_f64().expect("an error") < 0.05, "{record}");
+    assert_eq!((record["objects"].as_u64(), record["samples"].as_u64()), (Some(3), Some(4)));
+    let written = ["random-volumes-map.png", "random-volumes.json", "random-volumes.png"];
+    assert_eq!(files(&folder.path().join("out")), written);
+
+    for (bad, words) in [
+        (&["--samples", "5"][..], "--samples"),
+        (&["--method", "walk"], "ritree"),
+        (&["--size", "0x5"], "--size"),
+        (&["--count", "0"], "--count"),
+    ] {
+        let run = chordfield(folder.path(), &[&["trace", "random-volumes"], bad].concat());
+        assert_eq!(run.status.code(), Some(2), "{bad:?}");
+        assert!(err(&run).contains(words), "{bad:?}: {}", err(&run));
+    }
+    let run = chordfield(folder.path(), &["trace", "nothing-of-that-name"]);
+    assert!(err(&run).contains("bezier-surface"), "{}", err(&run));
+}

@@ -188,6 +188,7 @@ struct Rough;
 
 impl Attribute for Rough {
     type Output = f64;
+    type Real = f64;
 
     fn sample(&self, line: LinePoint) -> f64 {
         line.stuv.iter().map(|x| (1e3 * x).fract()).sum()

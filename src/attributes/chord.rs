@@ -66,6 +66,7 @@ const MISS: u32 = 0;
 impl Attribute for ChordLength<'_> {
     /// `None` if the line misses.
     type Output = Option<Chord>;
+    type Real = f64;
 
     fn sample(&self, point: LinePoint) -> Option<Chord> {
         let line = self.space.line_of(point)?;

@@ -1,4 +1,7 @@
 //! Attributes of lines that RI-trees hold.
 
 pub mod chord;
+pub mod exit_ray;
+pub mod lines;
 pub mod squared_chord;
+pub mod surface;

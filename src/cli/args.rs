@@ -3,6 +3,7 @@
 mod audit;
 mod bench;
 mod dose;
+mod trace;
 
 use std::path::PathBuf;
 
@@ -13,6 +14,7 @@ use crate::physics::DetectorResponse;
 pub use audit::{AuditArgs, RayArgs};
 pub use bench::{BenchCommand, CurveArgs, RunArgs, ScaleArgs};
 pub use dose::{DoseArgs, FormatArg, TableArg};
+pub use trace::TraceArgs;
 
 /// Exact intersection lengths of rays with organs: projection images of phantoms, with their numbers.
 ///
@@ -48,6 +50,8 @@ pub enum Command {
     ///
     /// Primary radiation only: no scatter, not for clinical use.
     Dose(Box<DoseArgs>),
+    /// Render a scene of smooth, mirroring and refracting objects, exactly or by RI-trees.
+    Trace(Box<TraceArgs>),
     /// Say whether scenes or mesh files can be projected, and if not, what to do about it.
     Check(CheckArgs),
     /// The phantoms that come with the program.

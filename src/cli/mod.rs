@@ -8,6 +8,7 @@ mod dose;
 mod phantom;
 mod project;
 mod session;
+mod trace;
 
 use std::io::Write;
 
@@ -29,6 +30,7 @@ pub fn run(cli: &Cli, session: &Session, out: &mut dyn Write) -> Result<Outcome>
         Command::Audit(args) => audit::run(args, session, out),
         Command::Bench(command) => bench::run(command, session, out).map(|()| Outcome::Done),
         Command::Dose(args) => dose::run(args, session, out).map(|()| Outcome::Done),
+        Command::Trace(args) => trace::run(args, session, out).map(|()| Outcome::Done),
         Command::Check(args) => check::run(args, out),
         Command::Phantom(command) => phantom::run(command, session, out).map(|()| Outcome::Done),
         Command::Completions { shell } => {

@@ -247,7 +247,7 @@ fn interpolation(args: &TreeArgs) -> Result<Interpolation> {
 }
 
 /// The paper's parameters.
-fn parameters(args: &TreeArgs) -> Result<Parameters> {
+pub fn parameters(args: &TreeArgs) -> Result<Parameters> {
     let default = Parameters::default();
     let parameters = Parameters {
         distance_threshold: args.distance_threshold.unwrap_or(default.distance_threshold),
@@ -263,6 +263,17 @@ fn parameters(args: &TreeArgs) -> Result<Parameters> {
     Ok(parameters)
 }
 
+/// The cache's bytes, and the share of it that pruning keeps.
+pub fn cache(args: &TreeArgs) -> Result<(usize, f64)> {
+    if !(0.0..=1e9).contains(&args.cache_mb) {
+        return refuse("--cache-mb", args.cache_mb, "give megabytes, 0 or more");
+    }
+    if !(0.0..=1.0).contains(&args.prune_keep) {
+        return refuse("--prune-keep", args.prune_keep, "give a share from 0 to 1");
+    }
+    Ok(((args.cache_mb * 1e6) as usize, args.prune_keep))
+}
+
 fn refuse<T>(name: &str, value: f64, remedy: &str) -> Result<T> {
     Err(Error::input(name, format!("{value} does not serve"), remedy))
 }
@@ -270,12 +281,7 @@ fn refuse<T>(name: &str, value: f64, remedy: &str) -> Result<T> {
 /// As [`method`], for another name with the same settings.
 pub fn method_named(name: MethodArg, args: &MethodArgs) -> Result<Method> {
     let args = &args.trees;
-    if !(0.0..=1e9).contains(&args.cache_mb) {
-        return refuse("--cache-mb", args.cache_mb, "give megabytes, 0 or more");
-    }
-    if !(0.0..=1.0).contains(&args.prune_keep) {
-        return refuse("--prune-keep", args.prune_keep, "give a share from 0 to 1");
-    }
+    let (cache_bytes, kept_share) = cache(args)?;
     let interpolation = interpolation(args)?;
     Ok(match name {
         MethodArg::Exact => Method::Exact(None),
@@ -285,8 +291,8 @@ pub fn method_named(name: MethodArg, args: &MethodArgs) -> Result<Method> {
         MethodArg::Bvh => Method::Exact(Some(Engine::Bvh)),
         MethodArg::Ritree => Method::RiTree(TreeSettings {
             interpolation,
-            cache_bytes: (args.cache_mb * 1e6) as usize,
-            kept_share: args.prune_keep,
+            cache_bytes,
+            kept_share,
             least_planes: args.tree_planes,
         }),
     })

@@ -33,6 +33,21 @@ struct Node {
     count: u32,
 }
 
+/// A branch-and-bound search along a ray, see [`BoxTree::search`].
+pub trait Search {
+    /// A distance along the ray.
+    type Distance: Copy + PartialOrd;
+
+    /// Where the ray enters a box. `None` if it misses it, or beyond what is sought.
+    fn entry(&self, bounds: &Bounds) -> Option<Self::Distance>;
+
+    /// Whether something nearer than this was found.
+    fn is_beyond(&self, entry: Self::Distance) -> bool;
+
+    /// Looks at an item.
+    fn item(&mut self, item: u32);
+}
+
 impl BoxTree {
     /// The hierarchy over `boxes`; item `i` is `boxes[i]`. Deterministic.
     pub fn build(boxes: &[Bounds]) -> Self {
@@ -112,6 +127,31 @@ impl BoxTree {
             node = if key_of(left) >= key_of(right) { left } else { right };
         }
         self.items_under(node)
+    }
+
+    /// Searches for the item nearest along a ray: nodes in the order in which the search enters them, children after
+    /// their parent, those beyond what was found meanwhile left out.
+    pub fn search<S: Search>(&self, search: &mut S) {
+        let Some(entry) = self.nodes.first().and_then(|root| search.entry(&root.bounds)) else { return };
+        let mut pending: Vec<(u32, S::Distance)> = Vec::with_capacity(MAX_DEPTH + 1);
+        pending.push((0, entry));
+        while let Some((index, entry)) = pending.pop() {
+            if search.is_beyond(entry) {
+                continue;
+            }
+            let node = &self.nodes[index as usize];
+            if node.count > 0 {
+                let range = node.start as usize..(node.start + node.count) as usize;
+                self.items[range].iter().for_each(|&i| search.item(i));
+                continue;
+            }
+            let [left, right] =
+                [index + 1, node.start].map(|i| Some((i, search.entry(&self.nodes[i as usize].bounds)?)));
+            let left_is_nearer = matches!((left, right), (Some(l), Some(r)) if l.1 < r.1);
+            let [first, second] = if left_is_nearer { [right, left] } else { [left, right] };
+            pending.extend(first);
+            pending.extend(second);
+        }
     }
 
     /// Calls `pair` for each pair of items (one of each hierarchy) in leaves whose boxes touch, until it breaks.

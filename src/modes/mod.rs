@@ -7,6 +7,7 @@ pub mod dose;
 pub mod figures;
 pub mod oracles;
 pub mod project;
+pub mod raytrace;
 pub mod reference;
 pub mod stability;
 

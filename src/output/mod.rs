@@ -6,6 +6,7 @@
 //! AuditReport ─► audit     ─► page: html · csv
 //! CurveReport, ScaleReport ─► bench ─► page: html · svg, csv
 //! Study, DoseReport ─► dose ─► csv, json lines
+//! Picture    ─► picture    ─► png
 //! any record ─► json
 //!                  └─► atomic: temporary file beside the target ─► flush ─► sync ─► rename
 //! ```
@@ -21,6 +22,7 @@ pub mod npy;
 pub mod obj;
 pub mod page;
 pub mod phantom;
+pub mod picture;
 pub mod png;
 pub mod projection;
 pub mod sidecar;

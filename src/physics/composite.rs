@@ -105,13 +105,14 @@ pub fn over([red, green, blue, alpha]: [f32; 4], background: [f32; 3]) -> [f32; 
 
 /// Linear RGB as 8-bit sRGB, rounded to the nearest; values outside 0..=1 are clamped, NaN is 0.
 pub fn encode_srgb8(linear: [f32; 3]) -> [u8; 3] {
-    linear.map(|channel| {
-        let light = f64::from(channel).clamp(0.0, 1.0);
-        let encoded =
-            if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
-        // A float to integer cast of NaN gives 0.
-        (255.0 * encoded).round() as u8
-    })
+    // A float to integer cast of NaN gives 0.
+    linear.map(|channel| (255.0 * encode_srgb(channel)).round() as u8)
+}
+
+/// A channel of linear light as sRGB encodes it (IEC 61966-2-1), 0 to 1; values outside are clamped.
+pub fn encode_srgb(linear: f32) -> f64 {
+    let light = f64::from(linear).clamp(0.0, 1.0);
+    if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }
 }
 
 /// Premultiplied linear RGBA as 8-bit sRGB with straight alpha, as PNG wants it. Fully transparent is four zeros.

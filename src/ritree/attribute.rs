@@ -1,5 +1,6 @@
 //! What a tree asks of whoever knows the objects.
 
+use crate::geometry::{Real, Vec3};
 use crate::linespace::{Cell, LinePoint, PlanePair};
 
 /// A geometric attribute of lines near one object: what an RI-tree samples and interpolates.
@@ -9,6 +10,9 @@ use crate::linespace::{Cell, LinePoint, PlanePair};
 pub trait Attribute: Sync {
     /// What a line's sample is: a length, a point and a normal, an exit ray.
     type Output: Clone + Send + Sync;
+
+    /// The numbers that queries are computed in: f64, unless their operations are counted.
+    type Real: Real;
 
     /// The exact output of a line.
     fn sample(&self, line: LinePoint) -> Self::Output;
@@ -22,7 +26,7 @@ pub trait Attribute: Sync {
 
     /// The output that the weighted outputs of one class make; weights sum to 1, but may be negative where five or
     /// more usable samples are extrapolated.
-    fn interpolate(&self, parts: &[(f64, &Self::Output)]) -> Self::Output;
+    fn interpolate(&self, parts: &[(Self::Real, &Self::Output)]) -> Self::Output;
 
     /// The class of a line, by the one intersection test of §2.5, asked when a cell holds exactly two. `None` if the test
     /// costs as much as tracing the line, which is then done instead.
@@ -34,7 +38,7 @@ pub trait Attribute: Sync {
     fn is_miss(&self, class: u32) -> bool;
 
     /// The direction of an output, for the angular threshold. `None` for attributes without directions.
-    fn direction(&self, _output: &Self::Output) -> Option<glam::DVec3> {
+    fn direction(&self, _output: &Self::Output) -> Option<Vec3<Self::Real>> {
         None
     }
 

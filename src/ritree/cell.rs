@@ -4,6 +4,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::Parameters;
 use super::attribute::Attribute;
+use crate::geometry::Real;
 use crate::linespace::{Cell, LinePoint, PlanePair};
 
 /// The outputs at the 16 corner lines of a cell, by the corner's bits (s, t, u, v from the lowest).
@@ -76,9 +77,10 @@ impl Place {
     }
 
     /// Which half holds the point: 0 or 1.
-    pub fn side_of(&self, stuv: &[f64; 4]) -> usize {
+    pub fn side_of<R: Real>(&self, stuv: &[f64; 4]) -> usize {
         let axis = self.axis();
-        usize::from(stuv[axis] >= 0.5 * (self.cell.low[axis] + self.cell.high[axis]))
+        let middle = R::of(0.5) * (R::of(self.cell.low[axis]) + R::of(self.cell.high[axis]));
+        usize::from(stuv[axis] >= middle.get())
     }
 
     /// One half: 0 or 1.
@@ -168,7 +170,7 @@ impl Place {
         if attribute.class(&exact) != class {
             return false;
         }
-        let near = attribute.distance(&quadrilinear(attribute, corners, [0.5; 4]), &exact);
+        let near = attribute.distance(&quadrilinear(attribute, corners, [A::Real::of(0.5); 4]), &exact);
         near <= threshold
     }
 
@@ -187,7 +189,8 @@ impl Place {
             return Err(Reason::Angle);
         }
         let weights = linear_weights(&usable, self.cell.fractions(&stuv)).ok_or(Reason::Silhouette)?;
-        let parts: Vec<_> = usable.iter().zip(weights).map(|(&bits, w)| (w, &corners[bits])).collect();
+        let part = |(&bits, weight)| (A::Real::of(weight), &corners[bits]);
+        let parts: Vec<_> = usable.iter().zip(weights).map(part).collect();
         Ok(attribute.interpolate(&parts))
     }
 }
@@ -197,12 +200,15 @@ impl Place {
 pub fn quadrilinear<A: Attribute>(
     attribute: &A,
     corners: &Corners<A::Output>,
-    fractions: [f64; 4],
+    fractions: [A::Real; 4],
 ) -> A::Output {
-    let weight = |bits: usize| -> f64 {
-        (0..4).map(|a| if bits >> a & 1 == 0 { 1.0 - fractions[a] } else { fractions[a] }).product()
+    let of_side = fractions.map(|f| [A::Real::of(1.0) - f, f]);
+    let pairs = |a: usize| -> [A::Real; 4] {
+        std::array::from_fn(|bits| of_side[a][bits & 1] * of_side[a + 1][bits >> 1])
     };
-    let parts: [(f64, &A::Output); 16] = std::array::from_fn(|bits| (weight(bits), &corners[bits]));
+    let (of_group, within) = (pairs(0), pairs(2));
+    let weight = |bits: usize| of_group[bits & 3] * within[bits >> 2];
+    let parts: [(A::Real, &A::Output); 16] = std::array::from_fn(|bits| (weight(bits), &corners[bits]));
     attribute.interpolate(&parts)
 }
 
@@ -230,6 +236,6 @@ where
     A::Output: 'a,
 {
     let directions: Vec<_> = outputs.filter_map(|o| attribute.direction(o)).collect();
-    let least_cosine = threshold_deg.to_radians().cos();
+    let least_cosine = A::Real::of(threshold_deg.to_radians().cos());
     directions.iter().enumerate().any(|(i, a)| directions[..i].iter().any(|b| a.dot(*b) < least_cosine))
 }

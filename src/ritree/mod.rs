@@ -34,6 +34,7 @@ pub use cell::{Place, Reason};
 pub use fitted::{Fit, Fitted, FittedTree};
 pub use stats::{BuildCounts, TreeShape};
 
+use crate::geometry::Real;
 use crate::linespace::{LinePoint, PlanePair, is_in_range};
 use cell::{Kind, Verdict, quadrilinear};
 use node::{Leaf, Node};
@@ -126,7 +127,7 @@ impl<A: Attribute> RiTree<A> {
                 }
             }
             let Some(halves) = node.halves() else { continue };
-            let side = place.side_of(&line.stuv);
+            let side = place.side_of::<A::Real>(&line.stuv);
             (node, place) = (&halves[side], place.half(side));
         }
     }
@@ -161,7 +162,7 @@ impl<A: Attribute> RiTree<A> {
                     return (self.answer(&place, &Leaf::new(kind, corners, 0), stuv), place.depth);
                 }
                 Verdict::Split => {
-                    let side = place.side_of(&stuv);
+                    let side = place.side_of::<A::Real>(&stuv);
                     let [lower, upper] = self.split(&place, &corners);
                     corners = if side == 0 { lower } else { upper };
                     place = place.half(side);
@@ -176,7 +177,7 @@ impl<A: Attribute> RiTree<A> {
         match leaf.kind() {
             Kind::Empty => Answer::Interpolated(corners[0].clone()),
             Kind::Smooth => {
-                let fractions = place.cell.fractions(&stuv);
+                let fractions = place.cell.fractions(&stuv.map(A::Real::of));
                 Answer::Interpolated(quadrilinear(&self.attribute, corners, fractions))
             }
             Kind::TwoClasses => {

@@ -1,10 +1,10 @@
 //! The tree against attributes whose answers are known in closed form.
 
-use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::*;
+use crate::geometry::Vec3;
 use crate::linespace::Cell;
 
 /// An attribute given by functions of (s, t, u, v): a value, and a class.
@@ -35,6 +35,7 @@ impl Test {
 
 impl Attribute for Test {
     type Output = Sample;
+    type Real = f64;
 
     fn sample(&self, line: LinePoint) -> Sample {
         Sample { value: (self.value)(line.stuv), class: (self.class)(line.stuv) }
@@ -60,9 +61,9 @@ impl Attribute for Test {
         class == MISS
     }
 
-    fn direction(&self, output: &Sample) -> Option<DVec3> {
+    fn direction(&self, output: &Sample) -> Option<Vec3<f64>> {
         let angle = self.turns * output.value;
-        (self.turns > 0.0).then(|| DVec3::new(angle.cos(), angle.sin(), 0.0))
+        (self.turns > 0.0).then(|| Vec3::new(angle.cos(), angle.sin(), 0.0))
     }
 
     fn is_certainly_empty(&self, _: PlanePair, _: &Cell) -> bool {

@@ -25,6 +25,7 @@ pub(crate) mod regular_file;
 pub(crate) mod schema;
 pub mod shape;
 pub(crate) mod text;
+pub mod trace;
 mod view;
 
 use crate::error::Result;

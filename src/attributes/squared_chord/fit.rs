@@ -48,7 +48,7 @@ impl<'a> SquaredChord<'a> {
         let look = |axis: usize, level: u32| {
             let parts = 0..4 * level;
             let root = Place::root(LineFrame::pair(axis));
-            self.look_at(&parts.fold(root, |place, _| place.half(place.side_of(&PROBES[axis]))))
+            self.look_at(&parts.fold(root, |place, _| place.half(place.side_of::<f64>(&PROBES[axis]))))
         };
         let mut noise = f64::INFINITY;
         // F is spread evenly over lines through a ball, from 0 to about 1 there.

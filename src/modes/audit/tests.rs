@@ -81,6 +81,7 @@ struct Perturbed<'a>(ChordLength<'a>, f32);
 
 impl Attribute for Perturbed<'_> {
     type Output = Option<Chord>;
+    type Real = f64;
 
     fn sample(&self, point: LinePoint) -> Option<Chord> {
         let chord = self.0.sample(point)?;

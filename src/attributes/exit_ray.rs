@@ -1,0 +1,137 @@
+//! The ray that leaves an object which mirrors or refracts.
+
+use std::marker::PhantomData;
+
+use super::lines::SurfaceLines;
+use super::surface::{Lights, Seen, blend, f32s, vector};
+use crate::geometry::{Ray, Real, Vec3};
+use crate::linespace::{Cell, LinePoint, PlanePair};
+use crate::ritree::Attribute;
+use crate::surface::Reach;
+use crate::surface::optics::{Optics, follow, reflected};
+
+/// The first hit of a line, and the ray that leaves the object at last: {normal, point, exit point, exit direction}.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Through {
+    /// The first hit.
+    pub seen: Seen,
+    /// How the ray was turned on its way, and by which patch last; a part of the class.
+    pub way: u32,
+    /// Where it leaves.
+    pub exit_point: [f32; 3],
+    /// Which way, unit length; zero if it does not leave within the limit.
+    pub exit_dir: [f32; 3],
+}
+
+impl Through {
+    const MISS: Self = Self { seen: Seen::MISS, way: 0, exit_point: [0.0; 3], exit_dir: [0.0; 3] };
+
+    /// How often the ray is turned.
+    pub fn turns(&self) -> u32 {
+        self.way & 0xff
+    }
+
+    /// The exit ray. `None` if the ray does not leave.
+    pub fn exit<R: Real>(&self) -> Option<Ray<R>> {
+        let leaves = self.exit_dir != [0.0; 3];
+        leaves.then(|| Ray { origin: vector(self.exit_point), dir: vector(self.exit_dir) })
+    }
+}
+
+/// The attribute of objects that mirror or refract.
+///
+/// Rays that are turned differently often, or leave by patches of different classes, are of different classes: between
+/// them the exit ray jumps.
+pub struct ExitRay<'a, L, R> {
+    lines: SurfaceLines<'a>,
+    lights: L,
+    optics: Optics,
+    limit: u32,
+    number: PhantomData<R>,
+}
+
+impl<'a, L: Lights, R: Real> ExitRay<'a, L, R> {
+    /// The exit rays of a surface, after at most `limit` turns.
+    pub fn new(lines: SurfaceLines<'a>, lights: L, optics: Optics, limit: u32) -> Self {
+        Self { lines, lights, optics, limit, number: PhantomData }
+    }
+
+    /// The surface's lines.
+    pub fn lines(&self) -> &SurfaceLines<'a> {
+        &self.lines
+    }
+}
+
+impl<L: Lights, R: Real> Attribute for ExitRay<'_, L, R> {
+    type Output = Through;
+    type Real = R;
+
+    fn sample(&self, line: LinePoint) -> Through {
+        let ray = self.lines.ray::<R>(line);
+        let surface = self.lines.surface();
+        let Some(hit) = surface.hit(&ray, Reach::whole()) else { return Through::MISS };
+        let path = follow(surface, &ray, hit, self.optics, self.limit);
+        let depth = self.lines.depth(hit.place(&ray), line.pair);
+        let seen = Seen::of(&hit, depth, self.lights.hidden(&ray, &hit));
+        let (exit_point, exit_dir) =
+            path.exit.map_or(([0.0; 3], [0.0; 3]), |exit| (f32s(exit.origin), f32s(exit.dir)));
+        Through { seen, way: path.turns.min(0xff) | path.last_class << 8, exit_point, exit_dir }
+    }
+
+    fn class(&self, output: &Through) -> u32 {
+        // Patch classes are few: below 2¹² of either kind nothing is lost.
+        output.seen.class ^ output.way.rotate_left(20)
+    }
+
+    fn is_miss(&self, class: u32) -> bool {
+        class == 0
+    }
+
+    /// The distance of the exit rays in line space (§2.3); of rays that do not leave, that of the hits' depths.
+    fn distance(&self, a: &Through, b: &Through) -> f64 {
+        match (a.exit::<R>(), b.exit::<R>()) {
+            (Some(a), Some(b)) => self.lines.ray_distance(&a, &b),
+            _ => f64::from(a.seen.depth - b.seen.depth).abs(),
+        }
+    }
+
+    /// A ray that a mirror turned once is mirrored at the interpolated normal, which keeps the law of reflection; all
+    /// other exit rays are interpolated. That is left to [`exit_of`](Self::exit_of), which knows the ray.
+    fn interpolate(&self, parts: &[(R, &Through)]) -> Through {
+        let Some((_, first)) = parts.first() else { return Through::MISS };
+        let depth =
+            parts.iter().fold(R::of(0.0), |sum, (weight, p)| sum + *weight * R::of(p.seen.depth.into()));
+        let normal = blend(parts.iter().map(|(weight, p)| (*weight, &p.seen.normal)));
+        let seen =
+            Seen { class: first.seen.class, depth: depth.get() as f32, normal: f32s(normal.normalized()) };
+        if first.exit_dir == [0.0; 3] || self.is_plain_mirror(first) {
+            return Through { seen, ..**first };
+        }
+        let point = blend(parts.iter().map(|(weight, p)| (*weight, &p.exit_point)));
+        let dir = blend(parts.iter().map(|(weight, p)| (*weight, &p.exit_dir)));
+        Through { seen, way: first.way, exit_point: f32s(point), exit_dir: f32s(dir.normalized()) }
+    }
+
+    /// Of the exit ray.
+    fn direction(&self, output: &Through) -> Option<Vec3<R>> {
+        (output.exit_dir != [0.0; 3]).then(|| vector(output.exit_dir))
+    }
+
+    fn is_certainly_empty(&self, pair: PlanePair, cell: &Cell) -> bool {
+        self.lines.is_certainly_empty::<R>(pair, cell)
+    }
+}
+
+impl<L: Lights, R: Real> ExitRay<'_, L, R> {
+    fn is_plain_mirror(&self, output: &Through) -> bool {
+        self.optics == Optics::Mirror && output.turns() == 1
+    }
+
+    /// The exit ray of an interpolated output for the ray that asked, which meets the object at `place`.
+    pub fn exit_of(&self, output: &Through, ray: &Ray<R>, place: Vec3<R>) -> Option<Ray<R>> {
+        if self.is_plain_mirror(output) {
+            return Some(Ray { origin: place, dir: reflected(ray.dir, vector(output.seen.normal)) });
+        }
+        output.exit()
+    }
+}

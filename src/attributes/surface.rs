@@ -1,0 +1,128 @@
+//! The first hit of a line on a surface: place, normal, and which lights the object itself hides.
+
+use std::marker::PhantomData;
+
+use super::lines::SurfaceLines;
+use crate::geometry::{Ray, Real, Vec3};
+use crate::linespace::{Cell, LinePoint, PlanePair};
+use crate::ritree::Attribute;
+use crate::surface::{Hit, Reach};
+
+/// What is known of a line's first hit, as samples hold it: {normal, point} of the paper, the point by how far along the
+/// dominant axis it lies, since it lies on the line. f32: its rounding is far below any useful threshold.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seen {
+    /// Within one class outputs are interpolated; 0 is a miss.
+    pub class: u32,
+    /// The place along the dominant axis, box units.
+    pub depth: f32,
+    /// The normal, unit length.
+    pub normal: [f32; 3],
+}
+
+impl Seen {
+    /// Nothing is hit.
+    pub const MISS: Self = Self { class: 0, depth: 0.0, normal: [0.0; 3] };
+
+    /// The class of the patch that is hit, the side it is hit from, and the lights hidden by the object itself, a bit for
+    /// each of the first eight.
+    pub(super) fn of<R: Real>(hit: &Hit<R>, depth: R, hidden: u8) -> Self {
+        let class = 1 + (u32::from(hidden) << 2 | u32::from(hit.enters) << 1) + (hit.class << 10);
+        Self { class, depth: depth.get() as f32, normal: f32s(hit.normal) }
+    }
+
+    /// The lights hidden by the object itself.
+    pub fn hidden(&self) -> u8 {
+        (self.class.wrapping_sub(1) >> 2) as u8
+    }
+
+    /// Whether the hit comes from the side that the normal points to.
+    pub fn enters(&self) -> bool {
+        self.class.wrapping_sub(1) >> 1 & 1 == 1
+    }
+}
+
+/// The parts of a vector as samples hold them.
+pub(super) fn f32s<R: Real>(v: Vec3<R>) -> [f32; 3] {
+    v.get().to_array().map(|x| x as f32)
+}
+
+/// A vector that samples hold.
+pub(crate) fn vector<R: Real>(v: [f32; 3]) -> Vec3<R> {
+    Vec3::new(R::of(v[0].into()), R::of(v[1].into()), R::of(v[2].into()))
+}
+
+/// A weighted sum of vectors.
+pub(super) fn blend<'a, R: Real>(parts: impl Iterator<Item = (R, &'a [f32; 3])>) -> Vec3<R> {
+    parts.fold(Vec3::default(), |sum, (weight, v)| sum + vector(*v) * weight)
+}
+
+/// Which lights of up to eight an object hides from a hit on itself, a bit each. A place that is lit from behind is not
+/// hidden: it is dark by its normal.
+pub trait Lights: Sync {
+    /// The bits for a hit along a ray.
+    fn hidden<R: Real>(&self, ray: &Ray<R>, hit: &Hit<R>) -> u8;
+}
+
+/// The attribute of surfaces that neither mirror nor refract.
+pub struct FirstHit<'a, L, R> {
+    lines: SurfaceLines<'a>,
+    lights: L,
+    number: PhantomData<R>,
+}
+
+impl<'a, L: Lights, R: Real> FirstHit<'a, L, R> {
+    /// The first hits on a surface under lights.
+    pub fn new(lines: SurfaceLines<'a>, lights: L) -> Self {
+        Self { lines, lights, number: PhantomData }
+    }
+
+    /// The surface's lines.
+    pub fn lines(&self) -> &SurfaceLines<'a> {
+        &self.lines
+    }
+}
+
+impl<L: Lights, R: Real> Attribute for FirstHit<'_, L, R> {
+    type Output = Seen;
+    type Real = R;
+
+    fn sample(&self, line: LinePoint) -> Seen {
+        let ray = self.lines.ray::<R>(line);
+        self.lines.surface().hit(&ray, Reach::whole()).map_or(Seen::MISS, |hit| {
+            let depth = self.lines.depth(hit.place(&ray), line.pair);
+            Seen::of(&hit, depth, self.lights.hidden(&ray, &hit))
+        })
+    }
+
+    fn class(&self, output: &Seen) -> u32 {
+        output.class
+    }
+
+    fn is_miss(&self, class: u32) -> bool {
+        class == Seen::MISS.class
+    }
+
+    /// The paper's distance is that of the rays (point, normal) in line space. On one line that is, but for slopes of at
+    /// most 1, how far the points and the normals' ends are apart, box units.
+    fn distance(&self, a: &Seen, b: &Seen) -> f64 {
+        let turned = vector::<R>(a.normal) - vector(b.normal);
+        let moved = R::of(a.depth.into()) - R::of(b.depth.into());
+        (moved * moved + turned.dot(turned)).sqrt().get()
+    }
+
+    fn interpolate(&self, parts: &[(R, &Seen)]) -> Seen {
+        let depth = parts.iter().fold(R::of(0.0), |sum, (weight, s)| sum + *weight * R::of(s.depth.into()));
+        let normal = blend(parts.iter().map(|(weight, s)| (*weight, &s.normal)));
+        let class = parts.first().map_or(0, |(_, s)| s.class);
+        Seen { class, depth: depth.get() as f32, normal: f32s(normal.normalized()) }
+    }
+
+    fn direction(&self, output: &Seen) -> Option<Vec3<R>> {
+        (output.class != Seen::MISS.class).then(|| vector(output.normal))
+    }
+
+    fn is_certainly_empty(&self, pair: PlanePair, cell: &Cell) -> bool {
+        self.lines.is_certainly_empty::<R>(pair, cell)
+    }
+}

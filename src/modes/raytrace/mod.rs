@@ -1,0 +1,345 @@
+//! Pictures of a world by ray tracing, exact or with RI-trees (Atalay & Mount, §2.4).
+//!
+//! ```text
+//!   camera ─► ray ─► nearest object ─► shading: ambient, lights (shadow rays), highlight
+//!              ▲      tree or traced    │
+//!              └──── exit ray ◄─────────┘  mirrored · refracted · straight on, up to a limit
+//! ```
+//!
+//! Trees are asked for what is smooth: the first hit of a line with its normal, the ray that leaves a mirror or a glass
+//! body, and whether a line to a light meets an object. They are kept from view to view. Where they do not answer, where a
+//! ray starts within an object's box, and for objects without a tree, rays are traced. Colours are floats to the end; a
+//! pixel depends on its rays alone, so pictures are the same bits for any number of threads.
+
+mod picture;
+mod seer;
+#[cfg(test)]
+mod tests;
+
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{PoisonError, RwLock, RwLockReadGuard};
+
+use rayon::prelude::*;
+
+use super::Control;
+use super::project::tiles;
+use crate::error::Result;
+use crate::geometry::{Ray, Real, Region, Vec3};
+use crate::ritree::{BuildCounts, Cache, Parameters, oldest_to_keep};
+use crate::scene::trace::{Camera, World};
+use crate::surface::optics::{reflectance, reflected};
+use crate::surface::{Reach, Slabs};
+pub use picture::{Picture, Samples};
+use seer::{Seer, Sight};
+
+/// How trees of what rays meet are grown; the defaults are the paper's.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Trees {
+    /// The thresholds and the depth.
+    #[serde(flatten)]
+    pub parameters: Parameters,
+    /// The most that nodes and samples of all trees may hold, bytes.
+    pub cache_bytes: usize,
+    /// The share of the cache that pruning keeps.
+    pub kept_share: f64,
+}
+
+impl Default for Trees {
+    fn default() -> Self {
+        Self { parameters: Parameters::default(), cache_bytes: 100_000_000, kept_share: 0.3 }
+    }
+}
+
+/// How rays find objects.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tracing {
+    /// Every ray exactly.
+    Exact,
+    /// By one RI-tree per object that grows one.
+    RiTree(Trees),
+}
+
+/// What rendering took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Work {
+    /// Rays: from the camera, turned, and to lights.
+    pub rays: u64,
+    /// Questions to trees.
+    pub queries: u64,
+    /// Questions that trees answered.
+    pub interpolated: u64,
+    /// Objects with a tree that were traced all the same.
+    pub traced: u64,
+    /// Floating-point operations; 0 unless they were counted.
+    pub operations: u64,
+}
+
+impl std::ops::AddAssign for Work {
+    fn add_assign(&mut self, other: Self) {
+        self.rays += other.rays;
+        self.queries += other.queries;
+        self.interpolated += other.interpolated;
+        self.traced += other.traced;
+        self.operations += other.operations;
+    }
+}
+
+/// A world made ready to be rendered, with its trees. `R` is the number it computes in:
+/// [`Counted`](crate::geometry::Counted) counts what it takes.
+pub struct Renderer<'a, R: Real> {
+    world: &'a World,
+    seers: RwLock<Vec<Seer<'a, R>>>,
+    cache: Cache,
+    kept_share: f64,
+    clock: AtomicU32,
+}
+
+impl<'a, R: Real> Renderer<'a, R> {
+    /// Makes a world ready.
+    pub fn new(world: &'a World, tracing: Tracing) -> Self {
+        let (parameters, settings) = match tracing {
+            Tracing::Exact => (None, Trees::default()),
+            Tracing::RiTree(settings) => (Some(settings.parameters), settings),
+        };
+        let seers = world.objects.iter().map(|object| Seer::new(object, world, parameters)).collect();
+        Self {
+            world,
+            seers: RwLock::new(seers),
+            cache: Cache::new(settings.cache_bytes),
+            kept_share: settings.kept_share,
+            clock: AtomicU32::new(1),
+        }
+    }
+
+    /// Renders one view of `columns` × `rows` pixels.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`](crate::Error::Interrupted) within a tile's time of a request to stop.
+    pub fn render(
+        &self,
+        camera: &Camera,
+        size: (u32, u32),
+        samples: &Samples,
+        control: &Control,
+    ) -> Result<Picture> {
+        let tiles: Vec<(Region, Tile)> = tiles(size)
+            .into_par_iter()
+            .map(|region| {
+                control.check()?;
+                let (mut tile, operations) = R::count(|| self.tile(camera, size, samples, &region));
+                tile.work.operations = operations;
+                self.prune_if_full();
+                control.advance(region.pixels() as u64);
+                Ok((region, tile))
+            })
+            .collect::<Result<_>>()?;
+        Ok(Picture::of_tiles(size, tiles))
+    }
+
+    /// Bytes that the trees hold.
+    pub fn tree_bytes(&self) -> usize {
+        self.cache.used_bytes()
+    }
+
+    /// What building the trees took.
+    pub fn build_counts(&self) -> BuildCounts {
+        self.enter().iter().map(Seer::build_counts).fold(BuildCounts::default(), |mut sum, counts| {
+            sum += counts;
+            sum
+        })
+    }
+
+    fn enter(&self) -> RwLockReadGuard<'_, Vec<Seer<'a, R>>> {
+        self.seers.read().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn tile(&self, camera: &Camera, size: (u32, u32), samples: &Samples, region: &Region) -> Tile {
+        let seers = self.enter();
+        let now = self.clock.fetch_add(1, Ordering::Relaxed);
+        seers.iter().for_each(|seer| seer.tick_to(now));
+        let mut light = LightPath {
+            world: self.world,
+            seers: &seers,
+            cache: &self.cache,
+            work: Work::default(),
+            was_traced: false,
+        };
+        let mut tile = Tile::default();
+        for (column, row) in region.places() {
+            light.was_traced = false;
+            let places = samples.of_pixel(column, row);
+            let sum = places.iter().fold(Vec3::default(), |sum, [x, y]| {
+                let ray = camera.ray(size, f64::from(column) + x, f64::from(row) + y);
+                sum + light.radiance(&ray, R::of(1.0), None, 0)
+            });
+            let mean = sum * R::of(1.0 / places.len() as f64);
+            tile.colours.push(mean.get().as_vec3().to_array());
+            tile.traced.push(light.was_traced);
+        }
+        tile.work = light.work;
+        tile
+    }
+
+    /// Forgets the least recently used leaves if the cache was full.
+    fn prune_if_full(&self) {
+        if !self.cache.is_full() {
+            return;
+        }
+        let mut seers = self.seers.write().unwrap_or_else(PoisonError::into_inner);
+        if !self.cache.is_full() {
+            // Another thread was first.
+            return;
+        }
+        let mut stamps = Vec::new();
+        seers.iter().for_each(|seer| seer.collect_stamps(&mut stamps));
+        let oldest = oldest_to_keep(stamps, (self.kept_share * self.cache.limit_bytes() as f64) as usize);
+        seers.iter_mut().for_each(|seer| seer.prune(oldest, &self.cache));
+        self.cache.relieved();
+    }
+}
+
+/// The pixels of one tile, row by row.
+#[derive(Default)]
+struct Tile {
+    colours: Vec<[f32; 3]>,
+    traced: Vec<bool>,
+    work: Work,
+}
+
+/// Light on its way back to the camera, for the rays of one tile.
+struct LightPath<'t, 'a, R: Real> {
+    world: &'t World,
+    seers: &'t [Seer<'a, R>],
+    cache: &'t Cache,
+    work: Work,
+    /// Whether an object with a tree was traced.
+    was_traced: bool,
+}
+
+/// Light that would change a pixel by less than this, a quarter of the least step of eight bits, is not followed.
+const LEAST_SHARE: f64 = 1e-3;
+
+impl<R: Real> LightPath<'_, '_, R> {
+    /// The light that comes along a ray; it makes up `share` of a pixel's. The object that the ray has `left` is not met
+    /// again: mirrors and glass bodies let rays go only when they leave for good, and what a clear sheet has of itself
+    /// behind it is not seen through it.
+    fn radiance(&mut self, ray: &Ray<R>, share: R, left: Option<usize>, turns: u32) -> Vec3<R> {
+        self.work.rays += 1;
+        let Some((object, sight)) = self.nearest(ray, left) else { return self.world.sky.seen(ray) };
+        let seer = &self.seers[object];
+        let material = seer.material();
+        let mut light = self.shade(object, ray, &sight);
+        if turns >= self.world.most_turns {
+            return light;
+        }
+        let is_worth = |part: R| (share * part).get() > LEAST_SHARE;
+        let clear = R::of(material.clear);
+        if is_worth(clear) {
+            let on = Ray { origin: sight.place, dir: ray.dir };
+            light = light + self.radiance(&on, share * clear, Some(object), turns + 1) * clear;
+        }
+        if let Some(glass) = material.glass
+            && material.mirror > 0.0
+            && seer.object.is_convex
+        {
+            // What a glass body mirrors outside, by Fresnel's share; inside, it is given up.
+            let part =
+                reflectance(-ray.dir.dot(sight.normal), R::of(1.0 / glass.index)) * R::of(material.mirror);
+            if is_worth(part) {
+                let dir = reflected(ray.dir, sight.normal);
+                let on = Ray { origin: sight.place, dir };
+                light = light + self.radiance(&on, share * part, Some(object), turns + 1) * part;
+            }
+        }
+        if let Some((on, inner_turns)) = seer.turned(ray, &sight) {
+            let part = R::of(material.share(inner_turns));
+            if is_worth(part) {
+                light = light + self.radiance(&on, share * part, Some(object), turns + 1) * part;
+            }
+        }
+        light
+    }
+
+    /// The nearest object along a ray.
+    fn nearest(&mut self, ray: &Ray<R>, left: Option<usize>) -> Option<(usize, Sight<R>)> {
+        let mut best: Option<(usize, Sight<R>)> = None;
+        for index in (0..self.seers.len()).filter(|&i| Some(i) != left) {
+            let to = best.as_ref().map_or(R::of(f64::INFINITY), |(_, sight)| sight.t);
+            if let Some(sight) = self.sight(index, ray, to) {
+                best = Some((index, sight));
+            }
+        }
+        best
+    }
+
+    /// One object along a ray, not beyond `to`.
+    fn sight(&mut self, index: usize, ray: &Ray<R>, to: R) -> Option<Sight<R>> {
+        let seer = &self.seers[index];
+        let (near, far) = Slabs::new(ray).stretch(&seer.bounds)?;
+        if near > to || far.get() <= 0.0 {
+            return None;
+        }
+        if seer.has_tree() {
+            // The tree knows the first hit of the whole line: it serves where the line enters the box ahead.
+            if near.get() > 0.0 {
+                self.work.queries += 1;
+                if let Ok(answer) = seer.ask(ray, self.cache) {
+                    self.work.interpolated += 1;
+                    return answer.filter(|sight| sight.t <= to);
+                }
+            }
+            self.work.traced += 1;
+            self.was_traced = true;
+        }
+        seer.trace(ray, Reach { to, ..Reach::whole() })
+    }
+
+    /// What a place shows of the lights and of the sky's light.
+    fn shade(&mut self, object: usize, ray: &Ray<R>, sight: &Sight<R>) -> Vec3<R> {
+        let world = self.world;
+        let material = self.seers[object].material();
+        let colour = Vec3::of(material.colour);
+        let mut light = colour.scaled(Vec3::of(world.ambient)) * R::of(material.ambient);
+        if material.is_dark() {
+            return light;
+        }
+        for (bit, lamp) in world.lights.iter().enumerate() {
+            let way = Vec3::of(lamp.position) - sight.place;
+            let far = way.length();
+            let dir = way * (R::of(1.0) / far);
+            let cosine = dir.dot(sight.normal);
+            if cosine.get() <= 0.0 || sight.hidden >> bit & 1 == 1 {
+                continue;
+            }
+            let reaching = self.visibility(object, &Ray { origin: sight.place, dir }, far);
+            if reaching.get() <= 0.0 {
+                continue;
+            }
+            let lamp = Vec3::of(lamp.colour) * reaching;
+            light = light + colour.scaled(lamp) * (cosine * R::of(material.diffuse));
+            if material.specular > 0.0 {
+                let mirrored = reflected(ray.dir, sight.normal);
+                let towards = mirrored.dot(dir).max(R::of(0.0));
+                light = light + lamp * (towards.powf(material.shininess) * R::of(material.specular));
+            }
+        }
+        light
+    }
+
+    /// The share of a light that reaches a place of an object through all others.
+    fn visibility(&mut self, object: usize, ray: &Ray<R>, far: R) -> R {
+        self.work.rays += 1;
+        let mut share = R::of(1.0);
+        for index in (0..self.seers.len()).filter(|&i| i != object) {
+            if share.get() > 0.0 && self.is_met(index, ray, far) {
+                share = share * R::of(self.seers[index].material().translucence());
+            }
+        }
+        share
+    }
+
+    /// Whether an object is met before `far`.
+    fn is_met(&mut self, index: usize, ray: &Ray<R>, far: R) -> bool {
+        self.sight(index, ray, far).is_some()
+    }
+}
