@@ -1,6 +1,7 @@
 //! What can be said on the command line.
 
 mod audit;
+mod bench;
 
 use std::path::PathBuf;
 
@@ -9,6 +10,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use crate::output::png::Polarity;
 use crate::physics::DetectorResponse;
 pub use audit::{AuditArgs, RayArgs};
+pub use bench::{BenchCommand, CurveArgs, RunArgs, ScaleArgs};
 
 /// Exact intersection lengths of rays with organs: projection images of phantoms, with their numbers.
 ///
@@ -37,6 +39,9 @@ pub enum Command {
     Project(Box<ProjectArgs>),
     /// Say how wrong lengths are: each ray against exact clipping, by organ, kind of error and place.
     Audit(Box<AuditArgs>),
+    /// Run time against error on your scene and machine: which method and setting to use.
+    #[command(subcommand)]
+    Bench(BenchCommand),
     /// Say whether scenes or mesh files can be projected, and if not, what to do about it.
     Check(CheckArgs),
     /// The phantoms that come with the program.

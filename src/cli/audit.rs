@@ -8,13 +8,14 @@ use serde::Serialize;
 
 use super::args::{AuditArgs, RayArgs};
 use super::project::{change, method, method_named, open};
-use super::{Outcome, Session, print};
+use super::{Outcome, Session, command_line, print, shell_words};
 use crate::error::{Error, Result};
 use crate::modes::Control;
-use crate::modes::audit::{Audit, AuditReport, AuditSettings, Probe, RaySet, shell_word};
+use crate::modes::audit::{Audit, AuditReport, AuditSettings, Probe, RaySet};
 use crate::modes::figures::Figures;
 use crate::modes::oracles::{self, Oracles, Size};
 use crate::modes::project::Method;
+use crate::output::page::short;
 use crate::output::{audit as output, json};
 use crate::scene::Scene;
 
@@ -44,7 +45,7 @@ pub fn run(args: &AuditArgs, session: &Session, out: &mut dyn Write) -> Result<O
     let control = Control::new(session.cancel(), &advance);
     let words: Vec<String> = std::env::args().skip(1).collect();
     let mut report = audit.run(&control)?;
-    report.command = format!("chordfield {}", shell_words(&words));
+    report.command = command_line();
     for worst in &mut report.worst {
         worst.reproduce = format!("chordfield {} {}", shell_words(&setting_words(&words)), worst.reproduce);
     }
@@ -188,10 +189,6 @@ fn setting_words(words: &[String]) -> Vec<String> {
     kept
 }
 
-fn shell_words(words: &[String]) -> String {
-    words.iter().map(|word| shell_word(word)).collect::<Vec<_>>().join(" ")
-}
-
 /// The report in a few lines.
 fn summary(report: &AuditReport, folder: Option<&Path>) -> String {
     let mut text = String::new();
@@ -211,7 +208,7 @@ fn summary(report: &AuditReport, folder: Option<&Path>) -> String {
             let share = 100.0 * f.beyond_tolerance;
             let _ = write!(text, "{name:28}{:>12}", f.compared);
             for value in [f.mean, f.rms, f.p50, f.p95, f.p99, f.p999, f.max, f.bias, share] {
-                let _ = write!(text, "{:>10}", output::short(value));
+                let _ = write!(text, "{:>10}", short(value));
             }
             text.push('\n');
         }
@@ -232,8 +229,8 @@ fn summary(report: &AuditReport, folder: Option<&Path>) -> String {
         );
     }
     if let Some(bounds) = whole.method.length_mm.confidence {
-        let [low, high] = bounds.mean.map(output::short);
-        let beyond = bounds.beyond_tolerance.map(|share| output::short(100.0 * share));
+        let [low, high] = bounds.mean.map(short);
+        let beyond = bounds.beyond_tolerance.map(|share| short(100.0 * share));
         let _ = writeln!(
             text,
             "of all lines, with 95 %: mean {low} to {high} mm; {} to {} % beyond {} mm",
@@ -241,14 +238,13 @@ fn summary(report: &AuditReport, folder: Option<&Path>) -> String {
         );
     }
     if let Some(reference) = report.reference {
-        let [mean, most] =
-            [reference.mean_ulps_of_distance, reference.max_ulps_of_distance].map(output::short);
+        let [mean, most] = [reference.mean_ulps_of_distance, reference.max_ulps_of_distance].map(short);
         let _ = writeln!(
             text,
             "the reference itself, {} lengths recomputed in rationals: off by {mean} units in the last place of the \
              distance on average, {most} at most; {} mm at most",
             reference.lengths,
-            output::short(reference.max_mm)
+            short(reference.max_mm)
         );
     }
     if let Some(worst) = report.worst.first() {

@@ -2,6 +2,7 @@
 
 pub mod args;
 mod audit;
+mod bench;
 mod check;
 mod phantom;
 mod project;
@@ -12,6 +13,7 @@ use std::io::Write;
 use clap::CommandFactory;
 
 use crate::error::{Error, Result};
+use crate::modes::audit::shell_word;
 use args::{Cli, Command};
 
 pub use session::Session;
@@ -24,6 +26,7 @@ pub fn run(cli: &Cli, session: &Session, out: &mut dyn Write) -> Result<Outcome>
     match &cli.command {
         Command::Project(args) => project::run(args, session, out).map(|()| Outcome::Done),
         Command::Audit(args) => audit::run(args, session, out),
+        Command::Bench(command) => bench::run(command, session, out).map(|()| Outcome::Done),
         Command::Check(args) => check::run(args, out),
         Command::Phantom(command) => phantom::run(command, session, out).map(|()| Outcome::Done),
         Command::Completions { shell } => {
@@ -54,6 +57,16 @@ impl Outcome {
             Self::Refused => 2,
         }
     }
+}
+
+/// The command line as it was given, so that a shell takes it again.
+fn command_line() -> String {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    format!("chordfield {}", shell_words(&words))
+}
+
+fn shell_words(words: &[String]) -> String {
+    words.iter().map(|word| shell_word(word)).collect::<Vec<_>>().join(" ")
 }
 
 /// Writes text to standard output.

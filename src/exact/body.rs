@@ -88,6 +88,14 @@ impl Body {
         self.bvh.get_or_init(|| Bvh::new(self.surface()))
     }
 
+    /// Forgets what engines have made ready; the next to be used makes it again. For measuring what that costs.
+    pub fn forget_engines(&mut self) {
+        self.bvh = OnceLock::new();
+        if let Form::Convex(convex) = &mut self.form {
+            convex.walker = OnceLock::new();
+        }
+    }
+
     /// The parts of `line` in the body, mm along `dir`, in order and disjoint; written to `parts`. By the engine that is
     /// the quickest for a line on its own.
     pub fn chords(&self, line: &Line, parts: &mut Vec<Interval>) {

@@ -25,6 +25,11 @@ impl<'a> Control<'a> {
         Self { cancel: &NEVER, progress: &|_| {} }
     }
 
+    /// The same flag to stop by, for work whose progress is told otherwise.
+    pub fn without_progress(&self) -> Self {
+        Self { progress: &|_| {}, ..*self }
+    }
+
     /// # Errors
     /// [`Error::Interrupted`] once the run was asked to stop.
     pub fn check(&self) -> Result<()> {

@@ -1,6 +1,7 @@
 //! What can be done with a scene. Modes return values; they print nothing and write no files.
 
 pub mod audit;
+pub mod bench;
 mod control;
 pub mod figures;
 pub mod oracles;

@@ -3,18 +3,21 @@
 //! ```text
 //! Projection ─► projection ─► png (to look at) │ metaimage, npy (to compute with)
 //! Scene      ─► phantom    ─► obj
-//! AuditReport ─► audit     ─► html, csv
+//! AuditReport ─► audit     ─► page: html · csv
+//! CurveReport, ScaleReport ─► bench ─► page: html · svg, csv
 //! any record ─► json
 //!                  └─► atomic: temporary file beside the target ─► flush ─► sync ─► rename
 //! ```
 
 pub mod atomic;
 pub mod audit;
+pub mod bench;
 pub mod image;
 pub mod json;
 pub mod metaimage;
 pub mod npy;
 pub mod obj;
+pub mod page;
 pub mod phantom;
 pub mod png;
 pub mod projection;

@@ -1,7 +1,7 @@
 //! What the words of the page mean.
 
-use super::page::{escape, grouped};
 use crate::modes::audit::AuditReport;
+use crate::output::page::{escape, grouped};
 
 /// The list of words.
 pub fn definitions(report: &AuditReport) -> String {

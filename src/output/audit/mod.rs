@@ -9,12 +9,10 @@
 //! | `histogram.csv` | errors by magnitude |
 //! | `worst.csv` | the worst rays, with what finds each again |
 
-mod base64;
 mod csv;
 mod definitions;
 mod page;
 mod panels;
-mod plot;
 
 use std::path::Path;
 
@@ -51,29 +49,4 @@ pub fn write(folder: &Path, report: &AuditReport, pictures: Option<&Pictures>) -
     }
     json::write(&record, report)?;
     Ok(())
-}
-
-/// A number in few characters: four digits, or two and a power of ten.
-pub fn short(value: f64) -> String {
-    let magnitude = value.abs();
-    if value == 0.0 {
-        return "0".into();
-    }
-    if !(1e-3..1e5).contains(&magnitude) {
-        return format!("{value:.1e}");
-    }
-    let decimals = (3 - magnitude.log10().floor() as i32).clamp(0, 5);
-    format!("{value:.*}", decimals as usize)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_are_short_and_keep_their_first_digits() {
-        let cases = [(0.0, "0"), (1234.56, "1235"), (0.012345, "0.01235"), (-3.2e-13, "-3.2e-13")];
-        assert!(cases.iter().all(|&(value, text)| short(value) == text), "{:?}", cases.map(|c| short(c.0)));
-        assert_eq!(short(f64::INFINITY), "inf");
-    }
 }

@@ -4,27 +4,14 @@ use std::fmt::Write as _;
 
 use super::definitions::definitions;
 use super::panels::Panel;
-use super::plot::{Form, Plot, Series, decade_name};
-use super::short;
 use crate::modes::audit::{AuditReport, Bar, KindFigures, OrganFigures};
 use crate::modes::figures::Figures;
 use crate::modes::project::Interpolation;
-
-const STYLE: &str = include_str!("page.css");
-
-const BLUE: &str = "#2166ac";
-const ORANGE: &str = "#d6604d";
-const GREY: &str = "#7a7a7a";
-const BLACK: &str = "#222222";
+use crate::output::page::plot::{Form, Plot, Series, decade_name};
+use crate::output::page::{BLACK, BLUE, GREY, ORANGE, document, escape, grouped, short};
 
 /// The whole page; `panels` are pictures of the worst ray's view.
 pub fn page(report: &AuditReport, panels: &[Panel]) -> String {
-    let title = format!("Length errors: {}", escape(&report.scene));
-    let mut html = format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-         <meta name=\"viewport\" content=\"width=device-width\"><title>{title}</title>\n\
-         <style>{STYLE}</style></head>\n<body><main>\n<h1>{title}</h1>\n"
-    );
     let sections = [
         ("", what(report)),
         ("", tiles(report)),
@@ -37,14 +24,7 @@ pub fn page(report: &AuditReport, panels: &[Panel]) -> String {
         ("The worst rays", worst(report)),
         ("How to read it", definitions(report)),
     ];
-    for (heading, content) in sections.iter().filter(|(_, content)| !content.is_empty()) {
-        if !heading.is_empty() {
-            let _ = writeln!(html, "<h2>{heading}</h2>");
-        }
-        let _ = writeln!(html, "{content}");
-    }
-    html.push_str("</main></body></html>\n");
-    html
+    document(&format!("Length errors: {}", report.scene), &sections)
 }
 
 /// What was compared with what.
@@ -359,35 +339,4 @@ fn worst(report: &AuditReport) -> String {
         }
     };
     table(first.iter().map(row).collect()) + &more
-}
-
-/// A whole number in groups of three.
-pub fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            // A thin space that does not break.
-            text.push('\u{202f}');
-        }
-        text.push(digit);
-    }
-    text
-}
-
-/// Text that HTML takes for nothing else.
-pub fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_cannot_become_markup_and_numbers_are_grouped() {
-        assert_eq!(escape("<b a=\"1\">&"), "&lt;b a=&quot;1&quot;&gt;&amp;");
-        assert_eq!(grouped(25_165_824), "25\u{202f}165\u{202f}824");
-        assert_eq!((grouped(0), grouped(999)), ("0".into(), "999".into()));
-    }
 }

@@ -3,11 +3,11 @@
 //! Large images are pooled: of the pixels that share one of the page's, the largest error is shown, so that a single
 //! wrong pixel is seen; of the others, the first.
 
-use super::base64;
 use crate::error::Result;
 use crate::modes::audit::Pictures;
 use crate::modes::project::Found;
 use crate::output::image::{RgbImage, image_of};
+use crate::output::page::{base64, short};
 use crate::output::png;
 
 /// The longest side of a picture on the page, pixels.
@@ -50,11 +50,11 @@ pub fn panels(pictures: &Pictures, tolerance_mm: f64) -> Result<Vec<Panel>> {
         let data = format!("data:image/png;base64,{}", base64::encode(&png::rgb_bytes(&image)?));
         Ok(Panel { title, note, data })
     };
-    let scale = format!("p from 0 (black) to {} (white), the same in both", super::short(most.into()));
+    let scale = format!("p from 0 (black) to {} (white), the same in both", short(most.into()));
     let heat_note = format!(
         "largest error of any organ's length: black none, pale yellow {} mm, on a square-root scale; \
          the tolerance is {tolerance_mm} mm",
-        super::short(worst.into())
+        short(worst.into())
     );
     Ok(vec![
         shown("Exact", scale.clone(), &|pixels| grey(&pictures.reference[first(pixels)]))?,

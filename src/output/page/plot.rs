@@ -8,6 +8,8 @@
 
 use std::fmt::Write as _;
 
+use super::short;
+
 const WIDTH: f64 = 680.0;
 const HEIGHT: f64 = 260.0;
 const LEFT: f64 = 64.0;
@@ -154,7 +156,7 @@ impl Plot<'_> {
                     "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\" fill=\"{}\"><title>{}: {}</title></circle>",
                     series.colour,
                     series.name,
-                    super::short(value)
+                    short(value)
                 );
             }
         }

@@ -1,0 +1,79 @@
+//! What can be said of a benchmark.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+use super::{BeamArgs, numbers};
+
+/// `bench`.
+#[derive(Debug, Subcommand)]
+pub enum BenchCommand {
+    /// Error against time for every method and setting on a scene: which to use.
+    Curve(Box<CurveArgs>),
+    /// How time grows with faces, pixels, views, organs, threads and the cache.
+    Scale(ScaleArgs),
+}
+
+/// `bench curve`.
+#[derive(Debug, Args)]
+pub struct CurveArgs {
+    /// A scene file, or the name of a phantom that comes with the program.
+    #[arg(default_value = "adult")]
+    pub scene: String,
+
+    /// Detector pixels of the runs.
+    #[arg(
+        long,
+        value_delimiter = ',',
+        value_name = "COLUMNSxROWS,…",
+        value_parser = parse_size,
+        default_value = "300x300,600x600,1200x1200"
+    )]
+    pub sizes: Vec<[u32; 2]>,
+
+    /// Leave a method out of a size for which it would take longer than this, seconds.
+    #[arg(long = "limit-s", value_name = "S", default_value_t = 120.0)]
+    pub limit_s: f64,
+
+    /// What all benchmarks share.
+    #[command(flatten)]
+    pub run: RunArgs,
+
+    /// Where rays come from, in place of what the scene says.
+    #[command(flatten)]
+    pub beam: BeamArgs,
+}
+
+/// `bench scale`.
+#[derive(Debug, Args)]
+pub struct ScaleArgs {
+    /// What all benchmarks share.
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+/// What all benchmarks share.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Runs")]
+pub struct RunArgs {
+    /// The folder for the report: a page, plots, JSON and CSV; made if missing. Nothing is written if left out.
+    #[arg(long, short, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+
+    /// Print the report as JSON on standard output, in place of a table.
+    #[arg(long)]
+    pub json: bool,
+
+    /// Rounds in which all take turns; medians are over these.
+    #[arg(long, value_name = "N", default_value_t = 7, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub rounds: u16,
+
+    /// Done in about a minute: fewer sizes and rounds.
+    #[arg(long)]
+    pub quick: bool,
+}
+
+fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    numbers(text, 'x')
+}

@@ -1,0 +1,115 @@
+//! `chordfield bench`.
+
+use std::io::Write;
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::args::{BenchCommand, CurveArgs, RunArgs, ScaleArgs, SourceArgs};
+use super::project::{change, open};
+use super::{Session, command_line, print};
+use crate::error::{Error, Result};
+use crate::modes::Control;
+use crate::modes::bench::Patience;
+use crate::modes::bench::curve::{self, CurveSettings};
+use crate::modes::bench::scale::{self, ScaleSettings};
+use crate::output::{bench as output, create_folder, json};
+
+/// A contender leaves its race after so long, seconds, once there are enough rounds for a median.
+const PATIENCE_S: f64 = 3.0;
+
+/// The same in a hurry.
+const HURRY: Patience = Patience { rounds: 3, seconds: 0.5 };
+
+/// Sizes in a hurry are no larger than this, columns times rows.
+const SMALL: u64 = 600 * 600;
+
+/// Measures, writes the report if a folder is named, and says its sum on `out`. What was measured before an interruption is
+/// written and said, too.
+///
+/// # Errors
+/// What stopped it; [`Error::Interrupted`] once the partial report is written.
+pub fn run(command: &BenchCommand, session: &Session, out: &mut dyn Write) -> Result<()> {
+    match command {
+        BenchCommand::Curve(args) => run_curve(args, session, out),
+        BenchCommand::Scale(args) => run_scale(args, session, out),
+    }
+}
+
+fn run_curve(args: &CurveArgs, session: &Session, out: &mut dyn Write) -> Result<()> {
+    let mut scene = open(&args.scene)?;
+    let unchanged = SourceArgs { energy_kev: None, kvp: None, response: None };
+    change(&mut scene, &args.beam, &unchanged)?;
+    let mut sizes = args.sizes.clone();
+    sizes.sort_unstable_by_key(|[columns, rows]| u64::from(*columns) * u64::from(*rows));
+    if args.run.quick {
+        let small = sizes.iter().filter(|[c, r]| u64::from(*c) * u64::from(*r) <= SMALL).count();
+        sizes.truncate(small.max(1));
+    }
+    if args.limit_s.is_nan() || args.limit_s <= 0.0 {
+        return Err(Error::input(
+            "--limit-s",
+            format!("{} does not serve", args.limit_s),
+            "give seconds, over 0",
+        ));
+    }
+    let settings = CurveSettings {
+        contenders: CurveSettings::contenders(),
+        sizes,
+        patience: patience(&args.run),
+        limit_s: args.limit_s,
+    };
+    settings.check(&scene)?;
+    let mut report = measure(session, &args.run, curve::turns(&settings), &scene.name, |control| {
+        curve::curve(&scene, &settings, control)
+    })?;
+    report.command = command_line();
+    finish(&args.run, &report, report.complete, output::write_curve, output::curve_table, out)
+}
+
+fn run_scale(args: &ScaleArgs, session: &Session, out: &mut dyn Write) -> Result<()> {
+    let settings = ScaleSettings { patience: patience(&args.run), quick: args.run.quick };
+    let mut report = measure(session, &args.run, scale::turns(&settings), "scale", |control| {
+        scale::scale(&settings, control)
+    })?;
+    report.command = command_line();
+    finish(&args.run, &report, report.complete, output::write_scale, output::scale_table, out)
+}
+
+fn patience(args: &RunArgs) -> Patience {
+    if args.quick { HURRY } else { Patience { rounds: args.rounds.into(), seconds: PATIENCE_S } }
+}
+
+fn measure<T>(
+    session: &Session,
+    args: &RunArgs,
+    turns: u64,
+    name: &str,
+    work: impl FnOnce(&Control) -> Result<T>,
+) -> Result<T> {
+    if let Some(folder) = &args.output {
+        // A folder that cannot be made is better known before the measurement than after it. From here on an interruption
+        // ends the measurement, not the program: there is something to write.
+        session.begin_writing();
+        create_folder(folder)?;
+    }
+    let bar = session.progress(turns, "turns");
+    bar.set_message(name.to_owned());
+    let advance = |turns| bar.inc(turns);
+    work(&Control::new(session.cancel(), &advance))
+}
+
+fn finish<T: Serialize>(
+    args: &RunArgs,
+    report: &T,
+    complete: bool,
+    write: fn(&Path, &T) -> Result<()>,
+    table: fn(&T) -> String,
+    out: &mut dyn Write,
+) -> Result<()> {
+    if let Some(folder) = &args.output {
+        write(folder, report)?;
+    }
+    print(out, &if args.json { json::text(report)? } else { table(report) })?;
+    if complete { Ok(()) } else { Err(Error::Interrupted) }
+}

@@ -1,0 +1,90 @@
+//! The files of a benchmark: a page to look at, plots, and all figures as JSON and CSV.
+//!
+//! | `bench curve` | `bench scale` | content |
+//! |---|---|---|
+//! | `curve.html` | `scale.html` | the report: one file, no network, no script |
+//! | `curve.csv` | `scale.csv` | a row for each method, setting and size |
+//! | `curve-cold.svg`, `curve-warm.svg` | `scale-faces.svg` … | its plots |
+//! | `curve.json` | `scale.json` | all figures; written last, so a folder without it holds an unfinished run |
+
+mod curve;
+mod scale;
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::page::{escape, short};
+use super::{create_folder, json, write_atomically};
+use crate::error::{Error, Result};
+use crate::modes::bench::Machine;
+use crate::modes::bench::curve::CurveReport;
+use crate::modes::bench::scale::ScaleReport;
+
+/// Writes the files of an error–time curve into `folder`, which is made if missing.
+///
+/// # Errors
+/// The first file that cannot be written. Files are whole or absent.
+pub fn write_curve(folder: &Path, report: &CurveReport) -> Result<()> {
+    write(folder, "curve", &curve::files(report), report)
+}
+
+/// Writes the files of studies of scale into `folder`, which is made if missing.
+///
+/// # Errors
+/// The first file that cannot be written. Files are whole or absent.
+pub fn write_scale(folder: &Path, report: &ScaleReport) -> Result<()> {
+    write(folder, "scale", &scale::files(report), report)
+}
+
+/// The table of an error–time curve as text.
+pub fn curve_table(report: &CurveReport) -> String {
+    curve::table(report)
+}
+
+/// The tables of studies of scale as text.
+pub fn scale_table(report: &ScaleReport) -> String {
+    scale::table(report)
+}
+
+/// A file's name and its text.
+type Named = (String, String);
+
+fn write(folder: &Path, name: &str, files: &[Named], report: &impl Serialize) -> Result<()> {
+    create_folder(folder)?;
+    let record = folder.join(format!("{name}.json"));
+    match std::fs::remove_file(&record) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Error::io("replace", &record, e)),
+        _ => {}
+    }
+    for (name, text) in files {
+        write_atomically(&folder.join(name), |out| out.write_all(text.as_bytes()))?;
+    }
+    json::write(&record, report)?;
+    Ok(())
+}
+
+/// Where and how times were measured, and by which command.
+fn machine(machine: &Machine, command: &str, complete: bool) -> String {
+    let build =
+        if machine.optimized { "" } else { " <b>Built with debug assertions: times mean little.</b>" };
+    let partial = if complete { "" } else { "<p><b>Interrupted: this is what was measured before.</b></p>" };
+    format!(
+        "<p class=\"lead\">{}, {} of {} cores, {}, {} instructions, {}.{build} Times are medians of rounds in which all \
+         take turns, after one to warm up; <i>cold</i> is from the scene as read to the last length, with all trees and \
+         tables, <i>warm</i> the same views again.</p><p class=\"command\"><code>{}</code></p>{partial}",
+        escape(&machine.processor),
+        machine.threads,
+        machine.cores,
+        escape(&machine.system),
+        machine.widest_instructions,
+        machine.date,
+        escape(command),
+    )
+}
+
+/// Seconds in few characters, with a mark if they are unsteady.
+fn seconds(times: &crate::modes::bench::Times) -> String {
+    let mark = if times.unsteady { " ±" } else { "" };
+    format!("{}{mark}", short(times.seconds))
+}
