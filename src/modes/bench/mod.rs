@@ -80,7 +80,13 @@ impl Contender {
     /// The options that choose it.
     pub fn options(&self) -> String {
         let dial = self.dial.map(|dial| format!(" --{} {}", dial.option, dial.value)).unwrap_or_default();
-        format!("--method {}{dial}", self.method.name())
+        let interpolation = match self.method {
+            Method::RiTree(TreeSettings { interpolation: Interpolation::Quadrilinear { .. }, .. }) => {
+                " --interpolation quadrilinear"
+            }
+            _ => "",
+        };
+        format!("--method {}{interpolation}{dial}", self.method.name())
     }
 }
 
