@@ -80,7 +80,7 @@ fn bombs_are_refused_in_a_sentence_and_in_little_memory() {
         (&["project", "key.toml"], "unknown field"),
         (&["project", "long.toml"], "larger than the limit"),
         (&["project", "pixels.toml"], "GB of memory"),
-        (&["project", "angles.toml"], "360000000000 angles"),
+        (&["project", "angles.toml"], "360000000000 values"),
         (&["project", "shape.toml"], "4000000000 faces"),
         (&["project", "balls.toml", "--size", "31623x31623"], "GB of memory"),
         (&["audit", "balls.toml", "--gantry", "0..360:1e-6"], "angles"),
