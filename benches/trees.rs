@@ -219,7 +219,8 @@ fn quadrilinear(out: &mut impl Write, name: &str, body: &Body, grid: &RayGrid) -
         let mut lengths = vec![0.0; pixels];
         let mut traced = 0;
         let mut find = || {
-            let rays = grid.whole().places().map(|(c, r)| grid.segment(c, r));
+            let whole = grid.whole();
+            let rays = whole.places().map(|(c, r)| grid.segment(c, r));
             traced = find_by(rays, body, &mut lengths, |ray| {
                 let point = tree.attribute().space().point_of(ray.line());
                 match tree.query(point, &cache) {

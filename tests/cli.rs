@@ -124,7 +124,7 @@ fn json_goes_to_standard_output_and_nothing_else_does() {
     let run =
         chordfield(folder.path(), &["project", "balls.toml", "--json", "--write", "p", "--threads", "1"]);
     let summary = summary(&run);
-    assert_eq!((&summary["method"], &summary["threads"]), (&"ritree".into(), &1.into()));
+    assert_eq!((&summary["method"], &summary["threads"]), (&"auto".into(), &1.into()));
     let count = |key: &str| summary[key].as_u64().unwrap_or_else(|| panic!("no {key}"));
     assert_eq!(
         count("organ_rays"),
@@ -382,6 +382,29 @@ fn the_engine_named_traces_every_organ_and_the_summary_says_so() {
 }
 
 #[test]
+fn auto_puts_organs_in_trees_only_where_they_are_quicker_and_says_so() {
+    let folder = folder();
+    let run = |more: &[&str]| {
+        let args = [&["project", "balls.toml", "--json", "--write", "lengths", "-o", "a"], more].concat();
+        summary(&chordfield(folder.path(), &args))
+    };
+    let few_faces = run(&[]);
+    assert_eq!((&few_faces["method"], &few_faces["ritree"]["trees"]["trees"]), (&"auto".into(), &0.into()));
+    assert_eq!(few_faces["organ_rays_interpolated"], 0);
+    assert!(
+        few_faces["choice"]
+            .as_str()
+            .is_some_and(|words| words.contains("20000") && words.contains("raster 2"))
+    );
+    let trees = run(&["--tree-planes", "500", "--tolerance", "3mm"]);
+    assert_eq!(trees["ritree"]["trees"]["trees"], 1, "the outer ball has 600 faces, the inner one 400");
+    assert!(trees["organ_rays_interpolated"].as_u64().is_some_and(|n| n > 0));
+    let paper = run(&["--distance-threshold", "0.1"]);
+    assert_eq!((&paper["method"], &paper["ritree"]["trees"]["trees"]), (&"ritree".into(), &2.into()));
+    assert!(paper["choice"].is_null());
+}
+
+#[test]
 fn ritrees_report_what_they_did_and_draw_their_map() {
     let folder = folder();
     let args = [
@@ -496,7 +519,7 @@ fn a_named_pipe_is_refused_instead_of_waited_for() {
 #[test]
 fn an_audit_writes_a_page_that_needs_nothing_else_and_its_figures_and_is_repeatable() {
     let folder = folder();
-    let args = ["audit", "balls.toml", "--gantry", "0,90", "-o", "report", "--json"];
+    let args = ["audit", "balls.toml", "--method", "ritree", "--gantry", "0,90", "-o", "report", "--json"];
     let report = summary(&chordfield(folder.path(), &args));
     let names = ["audit.html", "audit.json", "histogram.csv", "organs.csv", "sections.csv", "worst.csv"];
     assert_eq!(files(&folder.path().join("report")), names);
@@ -521,7 +544,8 @@ fn an_audit_writes_a_page_that_needs_nothing_else_and_its_figures_and_is_repeata
 fn a_broken_limit_exits_1_and_names_the_worst_ray_which_its_command_finds_again() {
     let folder = folder();
     for rays in [&["--gantry", "30"][..], &["--rays", "2e4", "--seed", "7"]] {
-        let args = [&["audit", "balls.toml", "--json", "--limit-mm", "0.001"], rays].concat();
+        let args =
+            [&["audit", "balls.toml", "--method", "ritree", "--json", "--limit-mm", "0.001"], rays].concat();
         let run = chordfield(folder.path(), &args);
         assert_eq!(run.status.code(), Some(1), "{}", err(&run));
         let report: serde_json::Value = serde_json::from_slice(&run.stdout).expect("only JSON");

@@ -123,8 +123,9 @@ pub struct ProjectArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Method")]
 pub struct MethodArgs {
-    /// By RI-trees (Atalay & Mount) that interpolate exact samples, or every length exactly.
-    #[arg(long, value_enum, default_value_t = MethodArg::Ritree)]
+    /// By RI-trees (Atalay & Mount) that interpolate exact samples, or every length exactly, or as is quicker for each organ;
+    /// a threshold of the paper's asks for its trees.
+    #[arg(long, value_enum, default_value_t = MethodArg::Auto)]
     pub method: MethodArg,
     /// How trees are grown.
     #[command(flatten)]
@@ -159,9 +160,9 @@ pub struct TreeArgs {
     /// RI-tree: the share of the cache that is kept when it is pruned.
     #[arg(long, value_name = "SHARE", default_value_t = 0.3, allow_negative_numbers = true)]
     pub prune_keep: f64,
-    /// RI-tree: bodies with fewer face planes are clipped instead.
-    #[arg(long, value_name = "N", default_value_t = 48)]
-    pub tree_planes: usize,
+    /// RI-tree: bodies with fewer face planes are found exactly instead [default: 48; 20000 of `auto`]
+    #[arg(long, value_name = "N")]
+    pub tree_planes: Option<usize>,
 }
 
 /// What is interpolated, as an argument.
@@ -176,6 +177,8 @@ pub enum InterpolationArg {
 /// A method as an argument.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum MethodArg {
+    /// By RI-trees for organs on which they were measured to be quicker, exactly for all others.
+    Auto,
     /// By RI-trees.
     Ritree,
     /// Every length exactly, by the quickest engine for each organ and view.
@@ -194,6 +197,7 @@ impl MethodArg {
     /// As on the command line.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Auto => "auto",
             Self::Ritree => "ritree",
             Self::Exact => "exact",
             Self::Clip => "clip",

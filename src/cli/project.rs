@@ -14,7 +14,8 @@ use crate::error::{Error, Result};
 use crate::exact::Engine;
 use crate::modes::Control;
 use crate::modes::project::{
-    DEFAULT_TOLERANCE_MM, Interpolation, Method, Projector, QueryCounts, RayCounts, TreeSettings, Wanted,
+    DEFAULT_TOLERANCE_MM, Interpolation, LEAST_PLANES_WHERE_QUICKER, Method, Projector, QueryCounts,
+    RayCounts, TreeSettings, Wanted,
 };
 use crate::output::projection::{self, Products};
 use crate::output::sidecar::{Sidecar, Summary, TreeSummary, ViewRecord};
@@ -73,7 +74,8 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
 
     let files = records.iter().flat_map(|(_, _, files)| files);
     let summary = Summary {
-        method: args.method.method.name(),
+        method: method.name(),
+        choice: choice(method, &engines, ritree.as_ref()),
         ritree,
         engines,
         views: views.len(),
@@ -188,7 +190,7 @@ fn tree_summary(
     queries: QueryCounts,
     views: &[View],
 ) -> Option<TreeSummary> {
-    let Method::RiTree(settings) = method else { return None };
+    let (Method::RiTree(settings) | Method::Auto(settings)) = method else { return None };
     let trees = projector.forest()?;
     Some(TreeSummary {
         settings,
@@ -196,6 +198,19 @@ fn tree_summary(
         trees,
         sampled_error_mm: projector.spot_check(views, SPOT_CHECK_RAYS, 1),
     })
+}
+
+/// What `auto` chose, and why.
+fn choice(method: Method, engines: &BTreeMap<Engine, u64>, trees: Option<&TreeSummary>) -> Option<String> {
+    let Method::Auto(settings) = method else { return None };
+    let of_engines: Vec<String> =
+        engines.iter().map(|(engine, n)| format!("{} {n}", engine.name())).collect();
+    Some(format!(
+        "{} organs in RI-trees: convex ones of {} face planes or more, on which trees were measured to be quicker; others          exactly, by the engine of least estimated cost for their faces and pixels, organs counted per view: {}",
+        trees.map_or(0, |trees| trees.trees.trees),
+        settings.least_planes,
+        if of_engines.is_empty() { "none".into() } else { of_engines.join(", ") }
+    ))
 }
 
 /// The method that the arguments name.
@@ -283,18 +298,24 @@ pub fn method_named(name: MethodArg, args: &MethodArgs) -> Result<Method> {
     let args = &args.trees;
     let (cache_bytes, kept_share) = cache(args)?;
     let interpolation = interpolation(args)?;
+    let trees = |least_planes| TreeSettings {
+        interpolation,
+        cache_bytes,
+        kept_share,
+        least_planes: args.tree_planes.unwrap_or(least_planes),
+    };
     Ok(match name {
         MethodArg::Exact => Method::Exact(None),
         MethodArg::Clip => Method::Exact(Some(Engine::Clip)),
         MethodArg::Walk => Method::Exact(Some(Engine::Walk)),
         MethodArg::Raster => Method::Exact(Some(Engine::Raster)),
         MethodArg::Bvh => Method::Exact(Some(Engine::Bvh)),
-        MethodArg::Ritree => Method::RiTree(TreeSettings {
-            interpolation,
-            cache_bytes,
-            kept_share,
-            least_planes: args.tree_planes,
-        }),
+        // The paper's trees are never the quicker: who names one of its thresholds wants to see them.
+        MethodArg::Ritree => Method::RiTree(trees(TreeSettings::default().least_planes)),
+        MethodArg::Auto => match interpolation {
+            Interpolation::Quadrilinear { .. } => Method::RiTree(trees(TreeSettings::default().least_planes)),
+            Interpolation::SquaredChord { .. } => Method::Auto(trees(LEAST_PLANES_WHERE_QUICKER)),
+        },
     })
 }
 

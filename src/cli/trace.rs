@@ -134,7 +134,7 @@ fn tracing(args: &TraceArgs) -> Result<Tracing> {
     }
     match args.method.method {
         MethodArg::Exact => Ok(Tracing::Exact),
-        MethodArg::Ritree => {
+        MethodArg::Ritree | MethodArg::Auto => {
             let (cache_bytes, kept_share) = project::cache(trees)?;
             Ok(Tracing::RiTree(Trees { parameters: project::parameters(trees)?, cache_bytes, kept_share }))
         }

@@ -197,6 +197,9 @@ impl ViewRecord {
 pub struct Summary {
     /// How lengths were found.
     pub method: &'static str,
+    /// What was chosen and why, if the method is to choose.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub choice: Option<String>,
     /// Views projected.
     pub views: usize,
     /// Organs in the scene.

@@ -69,7 +69,7 @@ impl<'a> ByMethod<'a> {
     pub fn new(bodies: Vec<&'a Body>, method: Method) -> Self {
         let (engine, settings): (_, Option<TreeSettings>) = match method {
             Method::Exact(engine) => (engine, None),
-            Method::RiTree(settings) => (None, Some(settings)),
+            Method::RiTree(settings) | Method::Auto(settings) => (None, Some(settings)),
         };
         let forest = settings.map(|settings| Forest::new(bodies.clone(), settings, false));
         Self { bodies, engine, forest }

@@ -174,7 +174,11 @@ impl AuditReport {
                 ..figures(&organ.name, ledger)
             }
         });
-        let trees = if let Method::RiTree(trees) = settings.method { Some(trees) } else { None };
+        let trees = if let Method::RiTree(trees) | Method::Auto(trees) = settings.method {
+            Some(trees)
+        } else {
+            None
+        };
         let by_distance = if has_views { distances(&total.by_distance) } else { Vec::new() };
         Self {
             program: "chordfield",

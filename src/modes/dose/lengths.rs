@@ -44,7 +44,9 @@ impl<'a> Tracer<'a> {
                 ));
             }
             Method::Exact(engine) => (engine, None),
-            Method::RiTree(settings) => (None, Some(Forest::new(bodies.clone(), settings, true))),
+            Method::RiTree(settings) | Method::Auto(settings) => {
+                (None, Some(Forest::new(bodies.clone(), settings, true)))
+            }
         };
         Ok(Self { bodies, bounds, engine, forest })
     }

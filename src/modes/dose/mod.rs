@@ -249,7 +249,8 @@ impl<'a> Dose<'a> {
 
     /// Errors of the method on a seeded sample of a part's paths, scene by scene, from the audit.
     fn errors(&self, shard: Shard, control: &Control) -> Result<Vec<SampledErrors>> {
-        let most = if matches!(self.method, Method::RiTree(_)) { SAMPLE } else { SAMPLE_OF_EXACT };
+        let most =
+            if matches!(self.method, Method::RiTree(_) | Method::Auto(_)) { SAMPLE } else { SAMPLE_OF_EXACT };
         let mut lines = vec![Vec::new(); self.study.scenes().len()];
         for path in sample(self.paths_of(self.blocks_of(shard)), most) {
             let fields = self.study.fields();

@@ -56,7 +56,7 @@ impl Size {
     pub fn of(method: Method) -> Self {
         match method {
             Method::Exact(_) => Self::default(),
-            Method::RiTree(_) => Self { pixels: 24, lines: 4_000, directions: 1 },
+            Method::RiTree(_) | Method::Auto(_) => Self { pixels: 24, lines: 4_000, directions: 1 },
         }
     }
 }

@@ -4,7 +4,7 @@ use super::Rays;
 use crate::exact::{Body, Engine, Lengths, Record, Spans};
 use crate::geometry::{Interval, Segment};
 use crate::modes::project::forest::{Forest, Grove, holds_box};
-use crate::modes::project::{Interpolation, Method, TreeSettings};
+use crate::modes::project::{Interpolation, Method};
 
 /// A way to find the lengths of rays in bodies.
 pub trait Witness: Sync {
@@ -71,7 +71,7 @@ impl Witness for MethodWitness {
                 Self::trace(body, engine, rays, &mut Lengths(&mut lengths));
                 lengths
             }
-            Method::RiTree(_) => sums(rays, self.parts(body, rays)),
+            Method::RiTree(_) | Method::Auto(_) => sums(rays, self.parts(body, rays)),
         }
     }
 
@@ -83,7 +83,7 @@ impl Witness for MethodWitness {
                 spans.drain(|ray, part| parts.push((ray, part)));
                 parts
             }
-            Method::RiTree(settings) => {
+            Method::RiTree(settings) | Method::Auto(settings) => {
                 let forest = Forest::new(vec![body], settings, true);
                 interpolate_all(&forest, body, rays)
             }
@@ -94,7 +94,7 @@ impl Witness for MethodWitness {
         match self.method {
             Method::Exact(_) => sets.iter().map(|rays| self.parts(body, rays)).collect(),
             // One tree for all: what becomes of a cell does not depend on who asks.
-            Method::RiTree(settings) => {
+            Method::RiTree(settings) | Method::Auto(settings) => {
                 let forest = Forest::new(vec![body], settings, true);
                 sets.iter().map(|rays| interpolate_all(&forest, body, rays)).collect()
             }
@@ -104,7 +104,7 @@ impl Witness for MethodWitness {
     fn lengths_of_each(&self, body: &Body, sets: &[Rays]) -> Vec<Vec<f64>> {
         match self.method {
             Method::Exact(_) => sets.iter().map(|rays| self.lengths(body, rays)).collect(),
-            Method::RiTree(_) => {
+            Method::RiTree(_) | Method::Auto(_) => {
                 let parts = self.parts_of_each(body, sets);
                 sets.iter().zip(parts).map(|(rays, parts)| sums(rays, parts)).collect()
             }
@@ -115,7 +115,9 @@ impl Witness for MethodWitness {
     /// middles, and is held here to the mean over all rays.
     fn promised_error_mm(&self, body: &Body) -> f64 {
         match self.method {
-            Method::RiTree(settings) if Forest::new(vec![body], settings, true).grows(0) => {
+            Method::RiTree(settings) | Method::Auto(settings)
+                if Forest::new(vec![body], settings, true).grows(0) =>
+            {
                 match settings.interpolation {
                     Interpolation::Quadrilinear { parameters } => {
                         parameters.distance_threshold * 0.5 * body.bounds().size().max_element()
@@ -129,10 +131,8 @@ impl Witness for MethodWitness {
 
     fn lengths_at_scale(&self, factor: f64, body: &Body, rays: &Rays) -> Vec<f64> {
         let mut method = self.method;
-        if let Method::RiTree(TreeSettings {
-            interpolation: Interpolation::SquaredChord { tolerance_mm },
-            ..
-        }) = &mut method
+        if let Method::RiTree(settings) | Method::Auto(settings) = &mut method
+            && let Interpolation::SquaredChord { tolerance_mm } = &mut settings.interpolation
         {
             *tolerance_mm *= factor;
         }

@@ -54,6 +54,23 @@ pub struct TreeSettings {
     pub least_planes: usize,
 }
 
+/// From so many face planes on, trees of squared chords are quicker than the exact engines: on ellipsoids, a first view
+/// of 600 × 600 takes them 0.8 times as long at 20 480 faces and 0.3 times at 327 680, later views half and a tenth.
+/// Below, and on organs with creases, the exact engines are up to thirty times as quick.
+pub const LEAST_PLANES_WHERE_QUICKER: usize = 20_000;
+
+impl TreeSettings {
+    /// Trees to a tolerance, mm, only for bodies on which they were measured to be quicker than exact engines; that
+    /// makes all others exact.
+    pub fn where_quicker(tolerance_mm: f64) -> Self {
+        Self {
+            interpolation: Interpolation::SquaredChord { tolerance_mm },
+            least_planes: LEAST_PLANES_WHERE_QUICKER,
+            ..Self::default()
+        }
+    }
+}
+
 impl Default for TreeSettings {
     fn default() -> Self {
         Self {

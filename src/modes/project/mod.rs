@@ -25,7 +25,9 @@ use crate::exact::Engine;
 use crate::geometry::Region;
 use crate::physics::{Attenuator, PhotonNoise};
 use crate::scene::{Scene, View};
-pub use forest::{DEFAULT_TOLERANCE_MM, ForestReport, Interpolation, QueryCounts, TreeSettings};
+pub use forest::{
+    DEFAULT_TOLERANCE_MM, ForestReport, Interpolation, LEAST_PLANES_WHERE_QUICKER, QueryCounts, TreeSettings,
+};
 
 use forest::Forest;
 use tile::TileTracer;
@@ -63,6 +65,9 @@ pub enum Method {
     Exact(Option<Engine>),
     /// By one RI-tree per convex organ, whose samples are exact chords; what it does not interpolate is exact.
     RiTree(TreeSettings),
+    /// By a tree where it was measured to be the quicker, by the quickest exact engine elsewhere; see
+    /// [`TreeSettings::where_quicker`].
+    Auto(TreeSettings),
 }
 
 impl Method {
@@ -71,6 +76,7 @@ impl Method {
         match self {
             Self::Exact(engine) => engine.map_or("exact", Engine::name),
             Self::RiTree(_) => "ritree",
+            Self::Auto(_) => "auto",
         }
     }
 }
@@ -113,7 +119,9 @@ impl<'a> Projector<'a> {
         let bodies = || scene.organs.iter().map(|organ| &organ.body).collect();
         let (engine, forest) = match method {
             Method::Exact(engine) => (engine, None),
-            Method::RiTree(settings) => (None, Some(Forest::new(bodies(), settings, wanted.colour))),
+            Method::RiTree(settings) | Method::Auto(settings) => {
+                (None, Some(Forest::new(bodies(), settings, wanted.colour)))
+            }
         };
         Ok(Self { scene, attenuator, noise, wanted, traced, engine, forest })
     }
