@@ -7,7 +7,7 @@
 //!   corners and normals ──────────┴───────────────► Mesh ──┘
 //! ```
 //!
-//! Kernels are generic over the number ([`Real`](crate::geometry::Real)), so that the operations they take are counted,
+//! Kernels are generic over the number ([`Real`]), so that the operations they take are counted,
 //! not estimated. Lengths are in the scene's unit (mm unless it says otherwise).
 
 mod frame;
