@@ -206,7 +206,7 @@ fn choice(method: Method, engines: &BTreeMap<Engine, u64>, trees: Option<&TreeSu
     let of_engines: Vec<String> =
         engines.iter().map(|(engine, n)| format!("{} {n}", engine.name())).collect();
     Some(format!(
-        "{} organs in RI-trees: convex ones of {} face planes or more, on which trees were measured to be quicker; others          exactly, by the engine of least estimated cost for their faces and pixels, organs counted per view: {}",
+        "{} organs in RI-trees: convex ones of {} face planes or more, on which trees were measured to be quicker; others exactly, by the engine of least estimated cost for their faces and pixels, organs counted per view: {}",
         trees.map_or(0, |trees| trees.trees.trees),
         settings.least_planes,
         if of_engines.is_empty() { "none".into() } else { of_engines.join(", ") }
