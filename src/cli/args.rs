@@ -160,7 +160,7 @@ pub struct TreeArgs {
     /// RI-tree: the share of the cache that is kept when it is pruned.
     #[arg(long, value_name = "SHARE", default_value_t = 0.3, allow_negative_numbers = true)]
     pub prune_keep: f64,
-    /// RI-tree: bodies with fewer face planes are found exactly instead [default: 48; 20000 of `auto`]
+    /// RI-tree: bodies with fewer face planes are found exactly instead [default: 48; 200000 of `auto`]
     #[arg(long, value_name = "N")]
     pub tree_planes: Option<usize>,
 }

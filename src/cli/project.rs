@@ -14,8 +14,8 @@ use crate::error::{Error, Result};
 use crate::exact::Engine;
 use crate::modes::Control;
 use crate::modes::project::{
-    DEFAULT_TOLERANCE_MM, Interpolation, LEAST_PLANES_WHERE_QUICKER, Method, Projector, QueryCounts,
-    RayCounts, TreeSettings, Wanted,
+    DEFAULT_TOLERANCE_MM, Interpolation, LEAST_PLANES_WHERE_QUICKER, LEAST_RAYS_WHERE_QUICKER, Method,
+    Projector, QueryCounts, RayCounts, TreeSettings, Wanted,
 };
 use crate::output::projection::{self, Products};
 use crate::output::sidecar::{Sidecar, Summary, TreeSummary, ViewRecord};
@@ -41,7 +41,7 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
     let labels = labels(&scene.name, &views);
     let noise = args.photons.photons.map(|n| PhotonNoise::new(n, args.photons.seed)).transpose()?;
     let products = products(args);
-    let method = method(&args.method)?;
+    let method = method(&args.method)?.for_rays(views.iter().map(View::pixels).sum());
     let projector = Projector::new(&scene, wanted(&products), noise, method)?;
     session.begin_writing();
     create_folder(&args.output)?;
@@ -206,9 +206,14 @@ fn choice(method: Method, engines: &BTreeMap<Engine, u64>, trees: Option<&TreeSu
     let of_engines: Vec<String> =
         engines.iter().map(|(engine, n)| format!("{} {n}", engine.name())).collect();
     Some(format!(
-        "{} organs in RI-trees: convex ones of {} face planes or more, on which trees were measured to be quicker; others exactly, by the engine of least estimated cost for their faces and pixels, organs counted per view: {}",
+        "{} organs in RI-trees: convex ones of {LEAST_PLANES_WHERE_QUICKER} face planes or more in studies of \
+         {LEAST_RAYS_WHERE_QUICKER} rays or more, on which trees were measured to be quicker{}; others exactly, by the engine of \
+         least estimated cost for their faces and pixels, organs counted per view: {}",
         trees.map_or(0, |trees| trees.trees.trees),
-        settings.least_planes,
+        match settings.least_planes {
+            LEAST_PLANES_WHERE_QUICKER | usize::MAX => String::new(),
+            planes => format!("; here, as asked for, ones of {planes} or more"),
+        },
         if of_engines.is_empty() { "none".into() } else { of_engines.join(", ") }
     ))
 }

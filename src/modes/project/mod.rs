@@ -26,7 +26,8 @@ use crate::geometry::Region;
 use crate::physics::{Attenuator, PhotonNoise};
 use crate::scene::{Scene, View};
 pub use forest::{
-    DEFAULT_TOLERANCE_MM, ForestReport, Interpolation, LEAST_PLANES_WHERE_QUICKER, QueryCounts, TreeSettings,
+    DEFAULT_TOLERANCE_MM, ForestReport, Interpolation, LEAST_PLANES_WHERE_QUICKER, LEAST_RAYS_WHERE_QUICKER,
+    QueryCounts, TreeSettings,
 };
 
 use forest::Forest;
@@ -65,12 +66,24 @@ pub enum Method {
     Exact(Option<Engine>),
     /// By one RI-tree per convex organ, whose samples are exact chords; what it does not interpolate is exact.
     RiTree(TreeSettings),
-    /// By a tree where it was measured to be the quicker, by the quickest exact engine elsewhere; see
-    /// [`TreeSettings::where_quicker`].
+    /// By a tree where it was measured to be the quicker, by the quickest exact engine elsewhere: trees grow for bodies of
+    /// [`LEAST_PLANES_WHERE_QUICKER`] face planes or more, see [`for_rays`](Self::for_rays).
     Auto(TreeSettings),
 }
 
 impl Method {
+    /// The method for a study of so many rays: of few, `Auto` makes no trees, unless told from how many planes on.
+    pub fn for_rays(self, rays: u64) -> Self {
+        match self {
+            Self::Auto(trees)
+                if rays < LEAST_RAYS_WHERE_QUICKER && trees.least_planes == LEAST_PLANES_WHERE_QUICKER =>
+            {
+                Self::Auto(TreeSettings { least_planes: usize::MAX, ..trees })
+            }
+            other => other,
+        }
+    }
+
     /// Its name, as on the command line.
     pub fn name(&self) -> &'static str {
         match self {
