@@ -212,6 +212,34 @@ impl Cell {
         (1..4).fold(0, |best, a| if side(a) > side(best) { a } else { best })
     }
 
+    /// Planes to part the cell's lines from a body with. Between the planes of `pair`, the lines fill a shaft, the hull of
+    /// the cell's two rectangles; eight planes touch it along its sides and its corners. Each is a normal n and a height h, box
+    /// units, with n·x ≥ h at all points x of the shaft: where n·x < h at each point of a body, no line meets it.
+    pub fn shaft_planes(&self, pair: PlanePair) -> impl Iterator<Item = (DVec3, f64)> {
+        const ACROSS: [[f64; 2]; 8] = [
+            [1.0, 0.0],
+            [-1.0, 0.0],
+            [0.0, 1.0],
+            [0.0, -1.0],
+            [1.0, 1.0],
+            [1.0, -1.0],
+            [-1.0, 1.0],
+            [-1.0, -1.0],
+        ];
+        let ([k, i, j], cell) = (pair.axes(), *self);
+        ACROSS.into_iter().map(move |[a, b]| {
+            // The least value of a·x_i + b·x_j among the cell's lines: `front` on its plane, `back` on the other, linear in
+            // between.
+            let least = |w: f64, axis: usize| w * if w > 0.0 { cell.low[axis] } else { cell.high[axis] };
+            let front = least(a, 0) + least(b, 1);
+            let back = least(a, 2) + least(b, 3);
+            let (at_0, at_1) = if pair.is_reversed() { (back, front) } else { (front, back) };
+            let mut normal = DVec3::ZERO;
+            (normal[i], normal[j], normal[k]) = (a, b, at_0 - at_1);
+            (normal, at_0)
+        })
+    }
+
     /// The two halves across `axis`.
     pub fn halves(&self, axis: usize) -> [Self; 2] {
         let middle = 0.5 * (self.low[axis] + self.high[axis]);

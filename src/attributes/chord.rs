@@ -1,7 +1,5 @@
 //! The chord: how many millimetres of a line lie in a body.
 
-use glam::DVec3;
-
 use crate::exact::Body;
 use crate::geometry::{Interval, Line};
 use crate::linespace::{Cell, LinePoint, LineSpace, PlanePair};
@@ -28,7 +26,7 @@ pub struct ChordLength<'a> {
 
 /// A separation below this is not believed: heights over the planes that bound a cell's shaft are sums of six products
 /// of box units up to 3, so they err by less than γ₁₆ · 18 < 1e-13.
-const LEAST_SEPARATION: f64 = 1e-12;
+pub(super) const LEAST_SEPARATION: f64 = 1e-12;
 
 impl<'a> ChordLength<'a> {
     /// The chords of `body`. `None` if it is not convex (a line may then have several chords) or its box is flat.
@@ -104,35 +102,19 @@ impl Attribute for ChordLength<'_> {
         true
     }
 
-    /// A cell's lines, between the planes, fill a shaft: the hull of its two rectangles. The shaft and the body are apart
-    /// if a plane parts them; planes are tried that touch the shaft along its sides and its corners, eight in all,
-    /// each against the body's farthest vertex.
+    /// See [`Cell::shaft_planes`]: each is held against the body's farthest vertex.
     fn is_certainly_empty(&self, pair: PlanePair, cell: &Cell) -> bool {
-        let [k, i, j] = pair.axes();
         let (min, size) = (self.space.min(), self.space.size());
-        let directions = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)];
-        directions.iter().any(|&(a, b)| {
-            let (a, b) = (f64::from(a), f64::from(b));
-            // The least value of a·x_i + b·x_j among the cell's lines: `front` on its plane, `back` on the other,
-            // linear in between.
-            let least = |w: f64, axis: usize| w * if w > 0.0 { cell.low[axis] } else { cell.high[axis] };
-            let front = least(a, 0) + least(b, 1);
-            let back = least(a, 2) + least(b, 3);
-            let (at_0, at_1) = if pair.is_reversed() { (back, front) } else { (front, back) };
-            // The body lies below if a·x_i + b·x_j − (at_0 + (at_1 − at_0)·x_k) < 0 at each of its points.
-            let mut n = DVec3::ZERO;
-            n[i] = a;
-            n[j] = b;
-            n[k] = at_0 - at_1;
-            let n = n / size;
-            let highest = self.body.surface().farthest_vertex(n, min, f64::NEG_INFINITY);
-            highest.is_some_and(|(height, _)| height - at_0 < -LEAST_SEPARATION)
+        cell.shaft_planes(pair).any(|(normal, least)| {
+            let highest = self.body.surface().farthest_vertex(normal / size, min, f64::NEG_INFINITY);
+            highest.is_some_and(|(height, _)| height - least < -LEAST_SEPARATION)
         })
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
     use rand::{RngExt, SeedableRng};
 
     use super::*;

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::chord::LEAST_SEPARATION;
 use crate::geometry::{Bounds, Ray, Real, Vec3, convex_hull};
 use crate::linespace::{Cell, LinePoint, LineSpace, PlanePair};
 use crate::surface::Surface;
@@ -13,9 +14,6 @@ pub struct SurfaceLines<'a> {
     space: LineSpace,
     hull: Vec<DVec3>,
 }
-
-/// As for chords: heights over a shaft's planes err by less than γ₁₆ · 18 < 1e-13 box units.
-const LEAST_SEPARATION: f64 = 1e-12;
 
 impl<'a> SurfaceLines<'a> {
     /// `None` if the surface has no extent.
@@ -71,24 +69,13 @@ impl<'a> SurfaceLines<'a> {
         squares.fold(R::of(0.0), |sum, x| sum + x).sqrt().get()
     }
 
-    /// Whether no line of the cell meets the surface, proved: a plane along the cell's shaft has all of the hull behind it.
-    /// See [`ChordLength`](super::chord::ChordLength) for the shaft.
+    /// Whether no line of the cell meets the surface, proved: a plane of the cell's [shaft](Cell::shaft_planes) has all of the
+    /// hull behind it.
     pub fn is_certainly_empty<R: Real>(&self, pair: PlanePair, cell: &Cell) -> bool {
-        let [k, i, j] = pair.axes();
         let (min, size) = (self.space.min(), self.space.size());
-        let directions = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)];
-        directions.iter().any(|&(a, b)| {
-            let (a, b) = (f64::from(a), f64::from(b));
-            let least = |w: f64, axis: usize| w * if w > 0.0 { cell.low[axis] } else { cell.high[axis] };
-            let front = least(a, 0) + least(b, 1);
-            let back = least(a, 2) + least(b, 3);
-            let (at_0, at_1) = if pair.is_reversed() { (back, front) } else { (front, back) };
-            let mut n = DVec3::ZERO;
-            n[i] = a;
-            n[j] = b;
-            n[k] = at_0 - at_1;
-            let n = Vec3::<R>::of(n / size);
-            let limit = at_0 - LEAST_SEPARATION + n.dot(Vec3::of(min)).get();
+        cell.shaft_planes(pair).any(|(normal, least)| {
+            let n = Vec3::<R>::of(normal / size);
+            let limit = least - LEAST_SEPARATION + n.dot(Vec3::of(min)).get();
             self.hull.iter().all(|&p| n.dot(Vec3::of(p)).get() < limit)
         })
     }

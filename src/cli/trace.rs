@@ -14,10 +14,8 @@ use crate::modes::raytrace::{Picture, Renderer, Samples, Tracing, Trees, Work};
 use crate::output::projection::safe_name;
 use crate::output::{create_folder, json, picture, remove_stale};
 use crate::ritree::BuildCounts;
+use crate::scene::panel::MAX_PIXELS;
 use crate::scene::trace::{self, Recipe, World};
-
-/// The most pixels of a picture, as of a detector.
-const MOST_PIXELS: u64 = 8192 * 8192;
 
 /// A run's record: what was rendered, how, and what it took.
 #[derive(Debug, Serialize)]
@@ -80,7 +78,7 @@ fn run_in<R: Real>(args: &TraceArgs, session: &Session, out: &mut dyn Write) -> 
         Error::input("--samples", format!("{} does not serve", args.samples), "give a square from 1 to 256")
     })?;
     let pixels = u64::from(args.size[0]) * u64::from(args.size[1]);
-    if !(1..=MOST_PIXELS).contains(&pixels) {
+    if !(1..=MAX_PIXELS).contains(&pixels) {
         return Err(Error::input("--size", "so many pixels do not serve", "give 1x1 to 8192x8192"));
     }
     session.begin_writing();

@@ -144,23 +144,13 @@ impl<'a> SquaredChord<'a> {
         Some(fit)
     }
 
-    /// Whether no line of the cell meets the body, proved: a plane parts the cell's shaft, the hull of its two rectangles,
-    /// from the body. Planes are tried that touch the shaft along its sides and its corners.
+    /// Whether no line of the cell meets the body, proved: a plane of the cell's [shaft](crate::linespace::Cell::shaft_planes)
+    /// has the body behind it.
     fn is_certainly_empty(&self, place: &Place) -> bool {
-        let ([k, i, j], cell) = (place.pair.axes(), &place.cell);
         let origin = self.frame.point_mm(DVec3::ZERO);
-        let directions = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)];
-        directions.iter().any(|&(a, b)| {
-            let (a, b) = (f64::from(a), f64::from(b));
-            // The least value of a·x_i + b·x_j among the cell's lines, on either plane; linear in between.
-            let least = |w: f64, axis: usize| w * if w > 0.0 { cell.low[axis] } else { cell.high[axis] };
-            let at_0 = least(a, 0) + least(b, 1);
-            let at_1 = least(a, 2) + least(b, 3);
-            // The body lies below if a·x_i + b·x_j − (at_0 + (at_1 − at_0)·x_k) < 0 at each of its points.
-            let mut n = DVec3::ZERO;
-            (n[i], n[j], n[k]) = (a, b, at_0 - at_1);
-            let n = self.frame.normal_mm(n);
-            self.body.surface().farthest_vertex(n, origin, at_0 - LEAST_SEPARATION).is_none()
+        place.cell.shaft_planes(place.pair).any(|(normal, least)| {
+            let n = self.frame.normal_mm(normal);
+            self.body.surface().farthest_vertex(n, origin, least - LEAST_SEPARATION).is_none()
         })
     }
 }

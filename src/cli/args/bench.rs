@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::{BeamArgs, numbers};
+use super::{BeamArgs, parse_pixels};
 
 /// `bench`.
 #[derive(Debug, Subcommand)]
@@ -27,7 +27,7 @@ pub struct CurveArgs {
         long,
         value_delimiter = ',',
         value_name = "COLUMNSxROWS,…",
-        value_parser = parse_size,
+        value_parser = parse_pixels,
         default_value = "300x300,600x600,1200x1200"
     )]
     pub sizes: Vec<[u32; 2]>,
@@ -72,8 +72,4 @@ pub struct RunArgs {
     /// Done in about a minute: fewer sizes and rounds.
     #[arg(long)]
     pub quick: bool,
-}
-
-fn parse_size(text: &str) -> Result<[u32; 2], String> {
-    numbers(text, 'x')
 }

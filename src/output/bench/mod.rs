@@ -15,8 +15,8 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::page::{escape, short};
-use super::{create_folder, json, write_atomically};
-use crate::error::{Error, Result};
+use super::{create_folder, json, remove_stale, write_atomically};
+use crate::error::Result;
 use crate::modes::bench::Machine;
 use crate::modes::bench::curve::CurveReport;
 use crate::modes::bench::scale::ScaleReport;
@@ -53,10 +53,7 @@ type Named = (String, String);
 fn write(folder: &Path, name: &str, files: &[Named], report: &impl Serialize) -> Result<()> {
     create_folder(folder)?;
     let record = folder.join(format!("{name}.json"));
-    match std::fs::remove_file(&record) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Error::io("replace", &record, e)),
-        _ => {}
-    }
+    remove_stale(&record)?;
     for (name, text) in files {
         write_atomically(&folder.join(name), |out| out.write_all(text.as_bytes()))?;
     }
