@@ -10,9 +10,7 @@ use crate::attributes::squared_chord::{ImageChords, ImageLengths, Known, Squared
 use crate::exact::{Body, Spans};
 use crate::geometry::{Interval, RayGrid, Region, Segment};
 use crate::modes::project::Found;
-use crate::ritree::{
-    Answer, BuildCounts, Cache, FittedTree, Parameters, Reason, RiTree, TreeShape, oldest_to_keep,
-};
+use crate::ritree::{Answer, BuildCounts, Cache, FittedTree, Parameters, Reason, RiTree, TreeShape};
 
 /// How lengths between samples are found.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -229,22 +227,15 @@ impl<'a> Forest<'a> {
 
     /// Forgets the least recently used leaves if the cache was full.
     pub fn prune_if_full(&self) {
-        if !self.cache.is_full() {
-            return;
-        }
-        let mut trees = self.trees.write().unwrap_or_else(PoisonError::into_inner);
-        if !self.cache.is_full() {
-            // Another thread was first.
-            return;
-        }
-        let mut stamps = Vec::new();
-        let all = trees.iter().filter_map(OnceLock::get);
-        all.for_each(|tree| either!(tree, tree => tree.collect_stamps(&mut stamps)));
-        let kept_bytes = (self.settings.kept_share * self.cache.limit_bytes() as f64) as usize;
-        let oldest = oldest_to_keep(stamps, kept_bytes);
-        let all = trees.iter_mut().filter_map(OnceLock::get_mut);
-        all.for_each(|tree| either!(tree, tree => tree.prune(oldest, &self.cache)));
-        self.cache.relieved();
+        let share = self.settings.kept_share;
+        let collect = |trees: &Vec<OnceLock<OrganTree>>, stamps: &mut Vec<_>| {
+            let all = trees.iter().filter_map(OnceLock::get);
+            all.for_each(|tree| either!(tree, tree => tree.collect_stamps(stamps)));
+        };
+        self.cache.prune_if_full(&self.trees, share, collect, |trees, oldest| {
+            let all = trees.iter_mut().filter_map(OnceLock::get_mut);
+            all.for_each(|tree| either!(tree, tree => tree.prune(oldest, &self.cache)));
+        });
     }
 
     pub fn report(&self) -> ForestReport {

@@ -17,9 +17,10 @@ use serde::Serialize;
 use super::page::{escape, short};
 use super::{create_folder, json, remove_stale, write_atomically};
 use crate::error::Result;
-use crate::modes::bench::Machine;
+
 use crate::modes::bench::curve::CurveReport;
 use crate::modes::bench::scale::ScaleReport;
+use crate::modes::bench::{Machine, Times};
 
 /// Writes the files of an error–time curve into `folder`, which is made if missing.
 ///
@@ -80,8 +81,17 @@ fn machine(machine: &Machine, command: &str, complete: bool) -> String {
     )
 }
 
+/// The columns of [`times`] in a table of comma-separated values.
+const TIMES: &str = "cold_s,cold_least_s,cold_most_s,warm_s,warm_least_s,warm_most_s,rounds";
+
+/// Times cold and warm as those columns.
+fn times(cold: &Times, warm: &Times) -> String {
+    let of = |times: &Times| format!("{},{},{}", times.seconds, times.least, times.most);
+    format!("{},{},{}", of(cold), of(warm), cold.rounds)
+}
+
 /// Seconds in few characters, with a mark if they are unsteady.
-fn seconds(times: &crate::modes::bench::Times) -> String {
+fn seconds(times: &Times) -> String {
     let mark = if times.unsteady { " ±" } else { "" };
     format!("{}{mark}", short(times.seconds))
 }

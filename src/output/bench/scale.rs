@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::{Named, machine, seconds};
-use crate::modes::bench::scale::{Fit, ScaleReport, ScaleRow, Study};
+use super::{Named, TIMES, machine, seconds, times};
+use crate::modes::bench::scale::{Fit, ScaleReport, ScaleRow, Study, methods};
 use crate::output::page::curves::{Axis, COLOURS, Curve, Curves, Point, Spacing};
 use crate::output::page::{document, escape, short};
 
@@ -19,19 +19,9 @@ pub fn files(report: &ScaleReport) -> Vec<Named> {
     files
 }
 
-fn methods(study: &Study) -> Vec<&str> {
-    let mut methods: Vec<&str> = Vec::new();
-    for row in &study.rows {
-        if !methods.contains(&row.options.as_str()) {
-            methods.push(&row.options);
-        }
-    }
-    methods
-}
-
 /// Seconds over size: cold drawn through, warm dashed. Where each size has a method of its own, they make one curve.
 fn plot(study: &Study) -> Curves<'_> {
-    let methods = methods(study);
+    let methods = methods(&study.rows);
     let is_one = methods.len() == study.rows.len();
     let groups: Vec<(String, Vec<&ScaleRow>)> = if is_one {
         vec![("--method ritree".into(), study.rows.iter().collect())]
@@ -118,24 +108,16 @@ fn fits(study: &Study) -> String {
 }
 
 fn csv(report: &ScaleReport) -> String {
-    let mut text = String::from(
-        "study,size,options,cold_s,cold_least_s,cold_most_s,warm_s,warm_least_s,warm_most_s,rounds,load_s,scene_bytes,tree_bytes\n",
-    );
+    let mut text = format!("study,size,options,{TIMES},load_s,scene_bytes,tree_bytes\n");
     for study in &report.studies {
         for row in &study.rows {
             let _ = writeln!(
                 text,
-                "\"{}\",{},{},{},{},{},{},{},{},{},{},{},{}",
+                "\"{}\",{},{},{},{},{},{}",
                 study.name,
                 row.size,
                 row.options,
-                row.cold.seconds,
-                row.cold.least,
-                row.cold.most,
-                row.warm.seconds,
-                row.warm.least,
-                row.warm.most,
-                row.cold.rounds,
+                times(&row.cold, &row.warm),
                 row.load_s,
                 row.scene_bytes.map(|b| b.to_string()).unwrap_or_default(),
                 row.tree_bytes,
