@@ -65,14 +65,14 @@ impl Bvh {
         segments: &[Segment],
         record: &mut impl Record,
     ) {
-        pulp::Arch::new().dispatch(Trace { bvh: self, surface, first_ray, segments, record });
+        crate::dispatch::arch().dispatch(Trace { bvh: self, surface, first_ray, segments, record });
     }
 
     /// Finds the parts of `line` inside `surface`, mm along `dir`, in order and disjoint; written to `found`. As exact as
     /// [`trace`](Self::trace).
     pub fn chords(&self, surface: &ClosedMesh, line: &Line, found: &mut Vec<Interval>) {
         let mut parts = Parts::default();
-        pulp::Arch::new().dispatch(Cross { bvh: self, surface, line, parts: &mut parts });
+        crate::dispatch::arch().dispatch(Cross { bvh: self, surface, line, parts: &mut parts });
         found.clear();
         found.extend(parts.intervals());
     }

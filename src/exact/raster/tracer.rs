@@ -84,7 +84,7 @@ impl<'v, 'a> Tracer<'v, 'a> {
     /// Traces it all, with the widest instructions that the machine has. None of them changes a bit: every operation is
     /// rounded by itself.
     pub fn trace(&mut self, record: &mut impl Record) {
-        pulp::Arch::new().dispatch(Widely { tracer: self, record });
+        crate::dispatch::arch().dispatch(Widely { tracer: self, record });
     }
 
     #[inline(always)]
