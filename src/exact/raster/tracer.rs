@@ -9,6 +9,7 @@ use super::cells::{CellFace, Pixels};
 use super::chords::{Depths, measure};
 use super::edge_on::{self, EdgeOn, is_edge_on, is_listed, pixels_along};
 use super::face::{Edge, Slope, order};
+use super::projection::Place;
 use super::{RasterView, Seen, round};
 use crate::exact::record::{Record, Way};
 use crate::geometry::Region;
@@ -206,7 +207,8 @@ impl<'v, 'a> Tracer<'v, 'a> {
         self.block.faces.push(Face { slope, number: face.number });
     }
 
-    /// The slope of a face that needs care; lists the pixels on it if it is edge-on.
+    /// The slope of a face that needs care. Lists the pixels on it if it is edge-on, and those it covers if its depth there
+    /// cannot be told.
     #[cold]
     #[inline(never)]
     pub fn look_closely(&mut self, face: &CellFace, limits: [f64; 2], block: &Pixels) -> Slope {
@@ -215,7 +217,27 @@ impl<'v, 'a> Tracer<'v, 'a> {
         if seen.edge_on.is_none() && is_edge_on(places, seen.place_error) {
             pixels_along(places, face.number, seen.place_error, block, &mut self.block.edge_on);
         }
-        Slope::careful(places, limits)
+        let (slope, is_right) = Slope::careful(places, seen.care, limits);
+        if !is_right {
+            self.list_covered(face.number, places, block);
+        }
+        slope
+    }
+
+    /// Lists the pixels that a face covers.
+    #[cold]
+    fn list_covered(&mut self, face: u32, corners: [Place; 3], block: &Pixels) {
+        let rows = corners.map(|corner| round::ceil(corner.y));
+        let [low, mid, high] = order(rows).0.map(|i| &corners[i]);
+        let (long, below, above) = (Edge::new(low, high), Edge::new(low, mid), Edge::new(mid, high));
+        let [first, turn, last] = sorted(rows);
+        for row in first.max(block.rows.start)..last.min(block.rows.end) {
+            let short = if row < turn { below } else { above };
+            let ends = [long, short].map(|edge| edge.first_right(row, self.seen.crossing_error));
+            let start = ends[0].min(ends[1]).max(block.columns.start);
+            let end = ends[0].max(ends[1]).min(block.columns.end);
+            self.block.edge_on.extend((start..end).map(|column| EdgeOn { row, column, face }));
+        }
     }
 
     /// The lengths of the block's rays.
@@ -233,7 +255,7 @@ impl<'v, 'a> Tracer<'v, 'a> {
     pub fn trace_edge_on(&self, record: &mut impl Record) {
         for e in &self.block.edge_on {
             let pixel = [e.column as u32, e.row as u32];
-            self.view.trace_ray(self.ray(e.row, e.column), pixel, e.face, record);
+            self.view.trace_ray(self.ray(e.row, e.column), pixel, record);
         }
     }
 
