@@ -54,7 +54,7 @@ fn a_curve_is_a_page_plots_and_figures_with_a_recommendation() {
 fn the_papers_figures_are_a_page_plots_and_tables_beside_its_own() {
     let folder = tempfile::tempdir().expect("a folder");
     let scenes = "random-volumes-absorption,adult";
-    let args = ["bench", "paper", "--quick", "--scale", "0.01", "--scenes", scenes, "-o", "p"];
+    let args = ["bench", "paper", "--quick", "--scale", "0.005", "--scenes", scenes, "-o", "p"];
     let output = run(folder.path(), &args);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     let table = String::from_utf8_lossy(&output.stdout);

@@ -45,7 +45,7 @@ pub struct PaperSettings {
 }
 
 /// Pictures have so many columns and rows at least.
-const LEAST_SIDE: f64 = 8.0;
+const LEAST_SIDE: f64 = 4.0;
 
 impl PaperSettings {
     /// Whether they serve.

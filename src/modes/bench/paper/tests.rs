@@ -24,7 +24,7 @@ fn a_sweep_has_errors_memory_operations_and_times_at_each_value_beside_the_paper
         }
     }
     let first = &report.sweeps[0];
-    assert_eq!((first.size, first.rows.len()), ([8, 8], 3));
+    assert_eq!((first.size, first.rows.len()), ([6, 6], 3));
     assert!(first.rows.iter().all(|row| row.published.is_some()));
     assert!(first.verdict.as_ref().is_some_and(|v| v.claims.len() == 2));
     assert!(first.beside_the_paper.as_ref().is_some_and(|words| words.contains("of 3")));
