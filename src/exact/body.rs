@@ -2,13 +2,17 @@
 
 use std::sync::OnceLock;
 
+use glam::{DMat3, DVec3};
+
 use super::Engine;
 use super::Record;
 use super::bvh::Bvh;
 use super::clip::ConvexClipper;
 use super::raster::Patches;
 use super::walk::{Unsure, Walker};
-use crate::geometry::{Bounds, ClosedMesh, ConvexMesh, Interval, Line, NotConvex, RayGrid, Region, Segment};
+use crate::geometry::{
+    Bounds, ClosedMesh, ConvexMesh, Interval, Line, NotConvex, RayGrid, Region, Segment, ball_of_inertia,
+};
 
 /// A closed body, ready for exact chords. What an engine needs beyond the surface is made when the engine is first used.
 #[derive(Clone, Debug)]
@@ -82,6 +86,15 @@ impl Body {
         match &self.form {
             Form::Convex(convex) => Some(convex.walker.get_or_init(|| Walker::new(&convex.mesh))),
             Form::General { .. } => None,
+        }
+    }
+
+    /// A point in the middle of the body, mm, and the linear map from mm about it to a frame in which the body is about a
+    /// ball of radius 1: its ellipsoid of inertia becomes that ball.
+    pub fn ball_frame(&self) -> (DVec3, DMat3) {
+        match self.walker() {
+            Some(walker) => walker.ball_frame(),
+            None => ball_of_inertia(self.surface().mesh().triangles(), self.bounds()),
         }
     }
 
