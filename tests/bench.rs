@@ -51,12 +51,43 @@ fn a_curve_is_a_page_plots_and_figures_with_a_recommendation() {
 }
 
 #[test]
+fn the_papers_figures_are_a_page_plots_and_tables_beside_its_own() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scenes = "random-volumes-absorption,adult";
+    let args = ["bench", "paper", "--quick", "--scale", "0.005", "--scenes", scenes, "-o", "p"];
+    let output = run(folder.path(), &args);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let table = String::from_utf8_lossy(&output.stdout);
+    assert!(table.contains("Table 2: random volumes, absorption") && table.contains("(2.951)"), "{table}");
+
+    let report = json(&folder.path().join("p/paper.json"));
+    assert_eq!((&report["complete"], &report["quick"]), (&true.into(), &true.into()));
+    let sweeps = report["sweeps"].as_array().expect("sweeps");
+    assert_eq!(sweeps.len(), 4, "thresholds of the volumes; threshold and depth of the phantom");
+    let rows = sweeps[0]["rows"].as_array().expect("rows");
+    assert!(rows.iter().all(|row| row["flop_speed_up"].as_f64().is_some_and(|s| s > 0.0)), "{rows:?}");
+    assert_eq!(rows[0]["published"]["cpu_speed_up"], 2.42804);
+    assert!(sweeps[0]["verdict"]["sentence"].as_str().is_some_and(|words| words.contains("direction is")));
+
+    let csv = std::fs::read_to_string(folder.path().join("p/paper.csv")).expect("a table");
+    let columns: Vec<usize> = csv.lines().map(|line| line.split(',').count()).collect();
+    assert!(columns.len() > 8 && columns.iter().all(|n| *n == columns[0]), "{columns:?}");
+    let page = std::fs::read_to_string(folder.path().join("p/paper.html")).expect("a page");
+    assert!(page.contains("<svg") && !page.contains("NaN") && !page.contains("src=\"http"));
+    let plot = folder.path().join("p/paper-random-volumes-absorption-angle-speed-up.svg");
+    assert!(std::fs::read_to_string(plot).expect("a plot").starts_with("<svg xmlns"));
+}
+
+#[test]
 fn what_cannot_be_measured_is_refused_and_nothing_is_written() {
     let folder = tempfile::tempdir().expect("a folder");
     for args in [
         &["bench", "curve", "missing.toml", "-o", "b"][..],
         &["bench", "curve", "calibration", "--limit-s", "nan", "-o", "b"],
         &["bench", "curve", "calibration", "--sizes", "0x4", "-o", "b"],
+        &["bench", "paper", "--scale", "0", "-o", "b"],
+        &["bench", "paper", "--rounds", "1", "-o", "b"],
+        &["bench", "paper", "--scenes", "teapot", "-o", "b"],
     ] {
         assert_eq!(run(folder.path(), args).status.code(), Some(2), "{args:?}");
         assert!(!folder.path().join("b").exists(), "{args:?}");
@@ -78,21 +109,23 @@ fn one_study_of_scale_may_be_run_alone() {
 #[cfg(unix)]
 #[test]
 fn an_interrupted_study_leaves_a_whole_report_that_says_so() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let mut child = chordfield(folder.path(), &["bench", "scale", "-q", "-o", "s"])
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .expect("the program starts");
-    // The folder appears when work begins; by then the signal is handled.
-    while !folder.path().join("s").exists() && child.try_wait().expect("a status").is_none() {
-        std::thread::sleep(std::time::Duration::from_millis(10));
+    for name in ["scale", "paper"] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut child = chordfield(folder.path(), &["bench", name, "-q", "-o", "s"])
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the program starts");
+        // The folder appears when work begins; by then the signal is handled.
+        while !folder.path().join("s").exists() && child.try_wait().expect("a status").is_none() {
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+        let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
+        assert!(killed.success());
+        assert_eq!(child.wait().expect("an end").code(), Some(130));
+        let report = json(&folder.path().join(format!("s/{name}.json")));
+        assert_eq!(report["complete"], false);
+        let page = std::fs::read_to_string(folder.path().join(format!("s/{name}.html"))).expect("a page");
+        assert!(page.contains("Interrupted") && page.ends_with("</html>\n"));
     }
-    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
-    assert!(killed.success());
-    assert_eq!(child.wait().expect("an end").code(), Some(130));
-    let report = json(&folder.path().join("s/scale.json"));
-    assert_eq!(report["complete"], false);
-    let page = std::fs::read_to_string(folder.path().join("s/scale.html")).expect("a page");
-    assert!(page.contains("Interrupted") && page.ends_with("</html>\n"));
 }

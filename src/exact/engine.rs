@@ -82,9 +82,9 @@ impl Body {
         let (columns, rows) = grid.size();
         let quickest = || self.engine_for_image(u64::from(columns) * u64::from(rows));
         let engine = engine.filter(|engine| engine.serves(self)).unwrap_or_else(quickest);
-        let raster = (engine == Engine::Raster).then(|| match self.convexity() {
-            Ok(_) => RasterView::of_convex(self.surface(), grid),
-            Err(_) => RasterView::new(self.surface(), grid),
+        let raster = (engine == Engine::Raster).then(|| {
+            let view = RasterView::of_patches(self.surface(), self.patches(), grid);
+            if self.convexity().is_ok() { view.as_convex() } else { view }
         });
         BodyView { body: self, grid: *grid, engine, raster }
     }

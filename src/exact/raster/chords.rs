@@ -14,21 +14,16 @@ use std::ops::Range;
 
 use pulp::Simd;
 
-use super::cells::{CellFace, Pixels};
 use super::edge_on::{self, EdgeOn};
 use super::face::{Edge, Slope, greater, order};
+use super::pixels::Pixels;
 use super::projection::Place;
-use super::round;
-use super::tracer::{BLOCK_COLUMNS, BLOCK_ROWS, RUN, Tracer, sorted};
+use super::tracer::{BLOCK_COLUMNS, BLOCK_ROWS, RUN, SeenFace, Tracer};
 use crate::exact::record::{Passes, Record, Way};
 use crate::geometry::Upstream;
 
 /// No instructions handle more pixels side by side.
 const LANES: usize = 8;
-
-/// Pixels of the body's rectangle for each face, at most. Where faces cover more, quotients at once are as quick as depths that are
-/// gone through again.
-pub const MOST_PIXELS: usize = 8;
 
 /// A row of depths: lanes may reach beyond the block on either side.
 const PITCH: usize = BLOCK_COLUMNS as usize + 2 * LANES;
@@ -109,15 +104,7 @@ impl Tracer<'_, '_> {
         record: &mut R,
     ) {
         self.block.depths.planes.resize(2 * PLANE, UNSET);
-        self.list_edge_on(block);
-        let seen = self.seen;
-        for cells in &seen.cells {
-            for faces in cells.near(block) {
-                for face in faces {
-                    self.mark::<CONE, S>(simd, face, block);
-                }
-            }
-        }
+        self.each_face(block, |tracer, face| tracer.mark::<CONE, S>(simd, face, block));
         if !self.block.edge_on.is_empty() {
             edge_on::sort(&mut self.block.edge_on);
             for e in &self.block.edge_on {
@@ -132,28 +119,21 @@ impl Tracer<'_, '_> {
 
     /// Marks the depths of a face at the pixels it covers.
     #[inline(always)]
-    fn mark<const CONE: bool, S: Simd>(&mut self, simd: S, face: &CellFace, block: &Pixels) {
-        let seen = self.seen;
-        let [a, b, c] = face.corners.map(|v| &seen.places[v as usize]);
-        let columns = [round::ceil(a.x), round::ceil(b.x), round::ceil(c.x)];
-        let rows = [round::ceil(a.y), round::ceil(b.y), round::ceil(c.y)];
-        let ([left, _, right], [first_row, turn, last_row]) = (sorted(columns), sorted(rows));
-        let within = first_row.max(block.rows.start)..last_row.min(block.rows.end);
-        if within.is_empty() || left >= block.columns.end || right <= block.columns.start {
-            return;
-        }
+    fn mark<const CONE: bool, S: Simd>(&mut self, simd: S, face: &SeenFace, block: &Pixels) {
         // Of the whole way, from the source to the pixel: shares from 0 to 1.
         let limits = if CONE { [1.0, f64::INFINITY] } else { [0.0, 1.0] };
-        let (mut slope, is_sure) = Slope::new([a, b, c], seen.care, limits);
+        let [a, b, c] = face.places.each_ref();
+        let (mut slope, is_sure) = Slope::new([a, b, c], self.seen.care, limits);
         if !is_sure {
             slope = self.look_closely(face, limits, block);
         }
         self.block.depths.is_any_set = true;
-        let outline = Outline { face: face.number, corners: [a, b, c], slope, rows, turn };
-        if is_sure && right - left <= SMALL && last_row - first_row <= SMALL {
-            self.mark_small(simd, &outline, [left, first_row], within, block);
+        let outline = Outline { face: face.number, corners: [a, b, c], slope, rows: face.rows, turn: face.turn };
+        let (columns, rows) = (&face.columns, face.within.clone());
+        if is_sure && columns.len() as i32 <= SMALL && face.last_row - face.first_row <= SMALL {
+            self.mark_small(simd, &outline, [columns.start, face.first_row], rows, block);
         } else {
-            self.mark_rows(simd, &outline, within, &block.columns, block);
+            self.mark_rows(simd, &outline, rows, &block.columns, block);
         }
     }
 

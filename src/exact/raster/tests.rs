@@ -417,7 +417,7 @@ fn spans_and_lengths_are_of_the_same_crossings() {
 
 fn lengths_of_chords(surface: &ClosedMesh, grid: &RayGrid, region: &Region) -> Vec<f64> {
     let mut lengths = vec![0.0; region.pixels()];
-    RasterView::of_convex(surface, grid).trace(region, &mut Lengths(&mut lengths));
+    RasterView::new(surface, grid).as_convex().trace(region, &mut Lengths(&mut lengths));
     lengths
 }
 
@@ -456,7 +456,7 @@ fn one_quotient_a_pixel_is_the_same_bits_in_any_region_and_with_the_ends() {
             let whole = lengths_of_chords(&surface, &grid, &grid.whole());
             let (mut sums, mut spans) = (vec![0.0; whole.len()], Spans::default());
             let mut both = (Lengths(&mut sums), &mut spans);
-            RasterView::of_convex(&surface, &grid).trace(&grid.whole(), &mut both);
+            RasterView::new(&surface, &grid).as_convex().trace(&grid.whole(), &mut both);
             assert_eq!(sums, whole);
             let mut by_spans = vec![0.0; whole.len()];
             spans.drain(|ray, part| by_spans[ray] += part.length());

@@ -5,12 +5,15 @@
 
 use std::ops::Range;
 
-use super::cells::{CellFace, Pixels};
+use super::RasterView;
+use super::aspect::Aspect;
 use super::chords::{Depths, measure};
 use super::edge_on::{self, EdgeOn, is_edge_on, is_listed, pixels_along};
 use super::face::{Edge, Slope, order};
+use super::patches::Patch;
+use super::pixels::Pixels;
 use super::projection::Place;
-use super::{RasterView, Seen, round};
+use super::seen::Seen;
 use crate::exact::record::{Record, Way};
 use crate::geometry::Region;
 
@@ -24,9 +27,12 @@ pub const RUN: usize = 64;
 /// Traces a region.
 pub struct Tracer<'v, 'a> {
     pub view: &'v RasterView<'a>,
-    pub seen: &'v Seen,
+    pub seen: &'v Seen<'a>,
     asked: Pixels,
     pub block: Block,
+    aspect: Aspect,
+    /// Patches near a row of blocks, and near a block.
+    near: [Vec<u32>; 2],
 }
 
 /// A tracer at work.
@@ -58,7 +64,26 @@ pub struct Block {
     pub depths: Depths,
 }
 
-/// A face that may cover pixels.
+/// A face that may cover pixels of a block.
+pub struct SeenFace {
+    /// In the surface.
+    pub number: u32,
+    pub places: [Place; 3],
+    /// From the least ceiling of its corners' columns to the greatest.
+    pub columns: Range<i32>,
+    /// Ceilings of the corners' rows.
+    pub rows: [i32; 3],
+    /// The least, the middle and the greatest of them.
+    pub first_row: i32,
+    pub turn: i32,
+    pub last_row: i32,
+    /// The rows that are in the block.
+    pub within: Range<i32>,
+    /// Whether the pixels on it are listed if it is edge-on.
+    is_known: bool,
+}
+
+/// A face whose spans are listed.
 struct Face {
     slope: Slope,
     number: u32,
@@ -75,11 +100,11 @@ struct Span {
 }
 
 impl<'v, 'a> Tracer<'v, 'a> {
-    pub fn new(view: &'v RasterView<'a>, seen: &'v Seen, region: &Region) -> Self {
+    pub fn new(view: &'v RasterView<'a>, seen: &'v Seen<'a>, region: &Region) -> Self {
         // A grid of more than 2³⁰ columns or rows is not seen.
         let pixels = |range: &Range<u32>| range.start as i32..range.end as i32;
         let asked = Pixels { columns: pixels(&region.columns), rows: pixels(&region.rows) };
-        Self { view, seen, asked, block: Block::default() }
+        Self { view, seen, asked, block: Block::default(), aspect: Aspect::default(), near: Default::default() }
     }
 
     /// Traces it all, with the widest instructions that the machine has. None of them changes a bit: every operation is
@@ -90,14 +115,17 @@ impl<'v, 'a> Tracer<'v, 'a> {
 
     #[inline(always)]
     fn trace_blocks<S: pulp::Simd, R: Record>(&mut self, simd: S, record: &mut R) {
-        let is_by_chords = self.view.is_convex && self.seen.is_fine && !R::ASKS_FACES;
+        let is_by_chords = self.view.is_convex && !self.seen.source_is_inside && !R::ASKS_FACES;
         let common = self.asked.intersection(&self.seen.bounds);
         for top in common.rows.clone().step_by(BLOCK_ROWS as usize) {
+            let rows = top..(top + BLOCK_ROWS).min(common.rows.end);
+            let [near_rows, _] = &mut self.near;
+            self.seen.list_near(&Pixels { columns: common.columns.clone(), rows: rows.clone() }, None, near_rows);
             for left in common.columns.clone().step_by(BLOCK_COLUMNS as usize) {
-                let block = Pixels {
-                    columns: left..(left + BLOCK_COLUMNS).min(common.columns.end),
-                    rows: top..(top + BLOCK_ROWS).min(common.rows.end),
-                };
+                let columns = left..(left + BLOCK_COLUMNS).min(common.columns.end);
+                let block = Pixels { columns, rows: rows.clone() };
+                let [near_rows, near] = &mut self.near;
+                self.seen.list_near(&block, Some(near_rows), near);
                 match (is_by_chords, self.seen.projection.is_cone()) {
                     (true, true) => self.trace_block_of_chords::<true, S, R>(simd, &block, record),
                     (true, false) => self.trace_block_of_chords::<false, S, R>(simd, &block, record),
@@ -112,7 +140,6 @@ impl<'v, 'a> Tracer<'v, 'a> {
     fn trace_block<const CONE: bool>(&mut self, block: &Pixels, record: &mut impl Record) {
         self.block.faces.clear();
         self.block.span_count = 0;
-        self.list_edge_on(block);
         self.cover::<CONE>(block);
         if self.block.span_count > 0 {
             self.measure_rays(block);
@@ -134,44 +161,73 @@ impl<'v, 'a> Tracer<'v, 'a> {
         }
     }
 
-    /// Begins the list of rays to be traced by themselves with those known to lie in faces.
+    /// Goes through the faces that may cover pixels of the block, and begins the list of rays to be traced by themselves with
+    /// those that lie in the faces of patches on a line of pixels.
     #[inline(always)]
-    pub fn list_edge_on(&mut self, block: &Pixels) {
-        let known = self.seen.edge_on.as_deref().unwrap_or_default();
-        let in_block =
-            edge_on::in_rows(known, &block.rows).iter().filter(|e| block.columns.contains(&e.column));
+    pub fn each_face(&mut self, block: &Pixels, mut each: impl FnMut(&mut Self, &SeenFace)) {
         self.block.edge_on.clear();
-        self.block.edge_on.extend(in_block);
+        let near = std::mem::take(&mut self.near[1]);
+        let seen = self.seen;
+        for &patch_number in &near {
+            let patch = seen.patches.get(patch_number as usize);
+            self.aspect.look_at(&patch, &seen.projection, seen.patches.are_places());
+            let is_on_a_line = seen.sight(patch_number).is_on_a_line;
+            if is_on_a_line {
+                self.look_along(&patch, block);
+            }
+            for (corners, &number) in patch.corners.iter().zip(patch.numbers) {
+                let ceilings = corners.map(|corner| self.aspect.ceilings(corner));
+                let columns = ceilings.map(|[column, _]| column);
+                let rows = ceilings.map(|[_, row]| row);
+                let ([left, _, right], [first_row, turn, last_row]) = (sorted(columns), sorted(rows));
+                let within = first_row.max(block.rows.start)..last_row.min(block.rows.end);
+                if within.is_empty() || left >= block.columns.end || right <= block.columns.start {
+                    continue;
+                }
+                let places = corners.map(|corner| self.aspect.place(corner));
+                let face = SeenFace {
+                    number,
+                    places,
+                    columns: left..right,
+                    rows,
+                    first_row,
+                    turn,
+                    last_row,
+                    within,
+                    is_known: is_on_a_line,
+                };
+                each(self, &face);
+            }
+        }
+        self.near[1] = near;
+    }
+
+    /// Lists the pixels on edge-on faces of the patch that is looked at.
+    #[cold]
+    #[inline(never)]
+    fn look_along(&mut self, patch: &Patch, block: &Pixels) {
+        for (corners, &number) in patch.corners.iter().zip(patch.numbers) {
+            let places = corners.map(|corner| self.aspect.place(corner));
+            if is_edge_on(places, self.seen.place_error) {
+                pixels_along(places, number, self.seen.place_error, block, &mut self.block.edge_on);
+            }
+        }
     }
 
     /// Lists the faces and what they cover.
     #[inline(always)]
     fn cover<const CONE: bool>(&mut self, block: &Pixels) {
-        let seen = self.seen;
-        for cells in &seen.cells {
-            for faces in cells.near(block) {
-                for face in faces {
-                    self.cover_by::<CONE>(face, block);
-                }
-            }
-        }
+        self.each_face(block, |tracer, face| tracer.cover_by::<CONE>(face, block));
     }
 
     #[inline(always)]
-    fn cover_by<const CONE: bool>(&mut self, face: &CellFace, block: &Pixels) {
+    fn cover_by<const CONE: bool>(&mut self, face: &SeenFace, block: &Pixels) {
         let seen = self.seen;
-        let [a, b, c] = face.corners.map(|v| v as usize);
-        let (a, b, c) = (&seen.places[a], &seen.places[b], &seen.places[c]);
-        let columns = [round::ceil(a.x), round::ceil(b.x), round::ceil(c.x)];
-        let rows = [round::ceil(a.y), round::ceil(b.y), round::ceil(c.y)];
-        let [first_row, turn, last_row] = sorted(rows);
-        let (start, end) = (first_row.max(block.rows.start), last_row.min(block.rows.end));
-        let [left, _, right] = sorted(columns);
-        if start >= end || left >= block.columns.end || right <= block.columns.start {
-            return;
-        }
+        let (start, end) = (face.within.start, face.within.end);
+        let (rows, turn) = (face.rows, face.turn);
+        let [a, b, c] = face.places.each_ref();
         let (order, is_even) = order(rows);
-        let [low, mid, high] = order.map(|i| &seen.places[face.corners[i] as usize]);
+        let [low, mid, high] = order.map(|i| &face.places[i]);
         let (long, below, above) = (Edge::new(low, high), Edge::new(low, mid), Edge::new(mid, high));
         let is_right_out = is_even != seen.projection.is_mirrored();
         let slot = self.block.faces.len() as u32;
@@ -211,32 +267,30 @@ impl<'v, 'a> Tracer<'v, 'a> {
     /// cannot be told.
     #[cold]
     #[inline(never)]
-    pub fn look_closely(&mut self, face: &CellFace, limits: [f64; 2], block: &Pixels) -> Slope {
-        let seen = self.seen;
-        let places = face.corners.map(|v| seen.places[v as usize]);
-        if seen.edge_on.is_none() && is_edge_on(places, seen.place_error) {
-            pixels_along(places, face.number, seen.place_error, block, &mut self.block.edge_on);
+    pub fn look_closely(&mut self, face: &SeenFace, limits: [f64; 2], block: &Pixels) -> Slope {
+        let place_error = self.seen.place_error;
+        if !face.is_known && is_edge_on(face.places, place_error) {
+            pixels_along(face.places, face.number, place_error, block, &mut self.block.edge_on);
         }
-        let (slope, is_right) = Slope::careful(places, seen.care, limits);
+        let (slope, is_right) = Slope::careful(face.places, self.seen.care, limits);
         if !is_right {
-            self.list_covered(face.number, places, block);
+            self.list_covered(face, block);
         }
         slope
     }
 
     /// Lists the pixels that a face covers.
     #[cold]
-    fn list_covered(&mut self, face: u32, corners: [Place; 3], block: &Pixels) {
-        let rows = corners.map(|corner| round::ceil(corner.y));
-        let [low, mid, high] = order(rows).0.map(|i| &corners[i]);
+    fn list_covered(&mut self, face: &SeenFace, block: &Pixels) {
+        let [low, mid, high] = order(face.rows).0.map(|i| &face.places[i]);
         let (long, below, above) = (Edge::new(low, high), Edge::new(low, mid), Edge::new(mid, high));
-        let [first, turn, last] = sorted(rows);
-        for row in first.max(block.rows.start)..last.min(block.rows.end) {
-            let short = if row < turn { below } else { above };
+        for row in face.within.clone() {
+            let short = if row < face.turn { below } else { above };
             let ends = [long, short].map(|edge| edge.first_right(row, self.seen.crossing_error));
             let start = ends[0].min(ends[1]).max(block.columns.start);
             let end = ends[0].max(ends[1]).min(block.columns.end);
-            self.block.edge_on.extend((start..end).map(|column| EdgeOn { row, column, face }));
+            let pixel = |column| EdgeOn { row, column, face: face.number };
+            self.block.edge_on.extend((start..end).map(pixel));
         }
     }
 

@@ -236,7 +236,7 @@ fn errors(
 }
 
 /// The scene's views on a detector of so many pixels.
-fn views(scene: &Scene, pixels: [u32; 2]) -> Result<Vec<View>> {
+pub(super) fn views(scene: &Scene, pixels: [u32; 2]) -> Result<Vec<View>> {
     let detector = DetectorSpec { pixels: Some(Given::from(pixels)), ..DetectorSpec::default() };
     let beam = scene.beam.clone().overridden_by(BeamSpec { detector, ..BeamSpec::default() });
     Ok(beam.views()?)

@@ -12,6 +12,7 @@
 
 pub mod curve;
 mod machine;
+pub mod paper;
 mod race;
 mod samples;
 pub mod scale;
@@ -132,4 +133,15 @@ pub struct Program {
 impl Program {
     /// This one.
     pub const THIS: Self = Self { program: "chordfield", version: env!("CARGO_PKG_VERSION") };
+}
+
+/// A number to two digits.
+fn two_digits(value: f64) -> String {
+    digits(value, 2)
+}
+
+/// A number to so many digits, none of them a power of ten's.
+fn digits(value: f64, count: i32) -> String {
+    let decimals = (count - 1 - value.abs().max(1e-9).log10().floor() as i32).clamp(0, 9);
+    format!("{value:.*}", decimals as usize)
 }

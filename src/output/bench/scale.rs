@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{Named, TIMES, machine, seconds, times};
+use super::{COLD_AND_WARM, Named, TIMES, machine, seconds, times};
 use crate::modes::bench::scale::{Fit, ScaleReport, ScaleRow, Study, methods};
 use crate::output::page::curves::{Axis, COLOURS, Curve, Curves, Point, Spacing};
 use crate::output::page::{document, escape, short};
@@ -54,7 +54,7 @@ fn plot(study: &Study) -> Curves<'_> {
 }
 
 fn page(report: &ScaleReport) -> String {
-    let mut sections = vec![("", machine(&report.machine, &report.command, report.complete))];
+    let mut sections = vec![("", machine(&report.machine, &report.command, report.complete, COLD_AND_WARM))];
     for study in &report.studies {
         sections.push((study.name, section(study)));
     }

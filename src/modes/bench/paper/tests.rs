@@ -1,0 +1,87 @@
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use super::*;
+
+fn settings(inputs: &[Input]) -> PaperSettings {
+    PaperSettings {
+        inputs: inputs.to_vec(),
+        patience: Patience { rounds: 2, seconds: 5.0 },
+        quick: true,
+        scale: 0.01,
+    }
+}
+
+#[test]
+fn a_sweep_has_errors_memory_operations_and_times_at_each_value_beside_the_papers_figures() {
+    let report = paper(&settings(&[Input::RandomVolumesAbsorption]), &Control::none()).expect("a report");
+    assert!(report.complete && report.sweeps.len() == 2);
+    for sweep in &report.sweeps {
+        assert!(sweep.exact.time.is_some_and(|t| t.seconds > 0.0 && t.rounds == 2), "{sweep:?}");
+        for row in &sweep.rows {
+            assert!(row.error >= 0.0 && row.nodes > 0.0 && row.samples > row.nodes, "{row:?}");
+            assert!(row.cpu_speed_up.is_some_and(|s| s.median > 0.0) && row.memory_mb > 0.0);
+            assert!(row.flop_speed_up.is_some_and(|s| s > 0.0));
+        }
+    }
+    let first = &report.sweeps[0];
+    assert_eq!((first.size, first.rows.len()), ([6, 6], 3));
+    assert!(first.rows.iter().all(|row| row.published.is_some()));
+    assert!(first.verdict.as_ref().is_some_and(|v| v.claims.len() == 2));
+    assert!(first.beside_the_paper.as_ref().is_some_and(|words| words.contains("of 3")));
+}
+
+#[test]
+fn organs_made_of_faces_have_no_count_of_operations() {
+    let report = paper(&settings(&[Input::Adult]), &Control::none()).expect("a report");
+    assert_eq!(report.sweeps.len(), 2);
+    assert!(report.sweeps.iter().flat_map(|s| &s.rows).all(|row| row.flop_speed_up.is_none()));
+    assert!(report.sweeps[0].verdict.is_some() && report.sweeps[0].beside_the_paper.is_none());
+}
+
+#[test]
+fn an_interruption_leaves_the_rows_that_were_counted() {
+    let (cancel, turns) = (AtomicBool::new(false), AtomicU64::new(0));
+    let progress = |n| {
+        // The exact run and the first two of trees.
+        if turns.fetch_add(n, Ordering::Relaxed) + n == 3 {
+            cancel.store(true, Ordering::Relaxed);
+        }
+    };
+    let report =
+        paper(&settings(&[Input::BezierSurface]), &Control::new(&cancel, &progress)).expect("what there is");
+    assert!(!report.complete);
+    assert_eq!(report.sweeps.iter().map(|s| s.rows.len()).collect::<Vec<_>>(), [2]);
+    assert!(report.sweeps[0].rows.iter().all(|row| row.time.is_none() && row.flop_speed_up.is_some()));
+    assert_eq!(report.sweeps[0].exact.time, None);
+}
+
+#[test]
+fn the_papers_own_figures_go_the_way_that_is_looked_for() {
+    for plan in PLANS.iter().filter(|plan| plan.input != Input::Adult && plan.dial != Dial::CacheSize) {
+        let mut sweep = Sweep::of(plan, [1, 1]);
+        for setting in plan.settings(false) {
+            let Some(paper) = Published::find(plan.input, &setting.1.parameters) else { continue };
+            let found = row(plan, setting, &Outcome::default(), &Outcome::default());
+            sweep.rows.push(Row {
+                flop_speed_up: Some(paper.flop_speed_up),
+                error: paper.error,
+                memory_mb: paper.memory_mb.unwrap_or(f64::NAN),
+                ..found
+            });
+        }
+        sweep.judge();
+        let verdict = sweep.verdict.expect("figures");
+        assert!(verdict.reproduced, "{:?} {:?}: {}", plan.input, plan.dial, verdict.sentence);
+    }
+}
+
+#[test]
+fn settings_that_do_not_serve_are_refused() {
+    let good = settings(&[Input::Tomatoes]);
+    assert!(good.check().is_ok());
+    for scale in [0.0, -1.0, f64::NAN, 5.0] {
+        assert!(PaperSettings { scale, ..good.clone() }.check().is_err());
+    }
+    let hasty = Patience { rounds: 1, seconds: 1.0 };
+    assert!(PaperSettings { patience: hasty, ..good }.check().is_err());
+}
