@@ -7,7 +7,7 @@ use super::projection::Projection;
 use super::*;
 use crate::exact::{Lengths, Pierced, Spans, Way};
 use crate::geometry::primitives::{block, cube, icosphere, inside_out, prism};
-use crate::geometry::{ConvexMesh, Interval, Segment, TriMesh};
+use crate::geometry::{ConvexMesh, Interval, Segment, TriMesh, Upstream};
 
 fn closed(mesh: TriMesh) -> ClosedMesh {
     ClosedMesh::new(mesh).expect("closed").0
@@ -259,6 +259,20 @@ fn pixels_on_vertices_and_edges_are_given_to_one_face() {
     }
 }
 
+/// Whether the ray of a pixel may lie in a face that is edge-on.
+fn is_in_a_face(surface: &ClosedMesh, grid: &RayGrid, place_error: f64, [column, row]: [i32; 2]) -> bool {
+    let projection = Projection::new(grid);
+    let pixel = Pixels { columns: column..column + 1, rows: row..row + 1 };
+    let mut found = Vec::new();
+    for face in 0..surface.mesh().faces.len() {
+        let places = surface.mesh().triangle(face).map(|v| projection.place(projection.homogeneous(v)));
+        if edge_on::is_edge_on(places, place_error) {
+            edge_on::pixels_along(places, face as u32, place_error, &pixel, &mut found);
+        }
+    }
+    !found.is_empty()
+}
+
 #[test]
 fn coverage_is_that_of_the_exact_predicate() {
     use crate::geometry::predicates::cover;
@@ -278,14 +292,15 @@ fn coverage_is_that_of_the_exact_predicate() {
         view.trace(&grid.whole(), &mut pierced);
         // Their pixels are left to the engine for single rays.
         let is_all_but_edge_on = |face: usize| {
-            let [a, b, c] = surface.mesh().faces[face].map(|v| seen.places[v as usize]);
+            let place = |v: DVec3| seen.projection.place(seen.projection.homogeneous(v));
+            let [a, b, c] = surface.mesh().triangle(face).map(place);
             let limits = [0.0, 1.0];
             !face::Slope::new([&a, &b, &c], seen.care, limits).1
                 && !face::Slope::careful([a, b, c], seen.care, limits).1
         };
         let all_but_edge_on = [0, 1, 2, 3].map(is_all_but_edge_on);
         for (ray, (column, row)) in grid.whole().places().enumerate() {
-            if edge_on::is_listed(seen.edge_on.as_deref().unwrap_or_default(), row as i32, column as i32) {
+            if is_in_a_face(&surface, &grid, seen.place_error, [column as i32, row as i32]) {
                 continue;
             }
             let mut found: Vec<_> =
