@@ -111,7 +111,8 @@ impl Care {
             per_pixel: gamma(12) / place_error,
             per_depth: 1.0 / depth,
             of_thickness: THICKNESS * place_error,
-            depth_error: gamma(12) * depth,
+            // As much as the corners may be off, over the same distance.
+            depth_error: gamma(96) * depth,
         }
     }
 }

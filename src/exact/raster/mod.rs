@@ -45,7 +45,7 @@ use crate::geometry::{ClosedMesh, RayGrid, Region};
 /// A closed surface made ready for the rays of one grid.
 ///
 /// Crossings are exact for a surface whose vertices have moved by rounding: by γ₉₆ of the distance to the source, in pixels,
-/// over the share of the way they are at (`projection::Projection::place_error`).
+/// over the share of the way they are at (`projection::Projection::place_error`); and crossings by as much along the ray.
 /// What a ray meets does not depend on the region that it is asked in, to the last bit, nor does the order of its
 /// crossings.
 #[derive(Clone, Debug)]

@@ -6,6 +6,7 @@ use rand::{RngExt, SeedableRng};
 use super::projection::Projection;
 use super::*;
 use crate::exact::{Lengths, Pierced, Spans, Way};
+use crate::geometry::numeric::gamma;
 use crate::geometry::primitives::{block, cube, icosphere, inside_out, prism};
 use crate::geometry::{ConvexMesh, Interval, Segment, TriMesh, Upstream};
 
@@ -322,7 +323,7 @@ fn coverage_is_that_of_the_exact_predicate() {
             assert_eq!(found, expected, "({column}, {row})");
         }
     }
-    assert!(compared > 1_000 && left < compared / 20, "{compared} compared, {left} left out");
+    assert!(compared > 1_000 && left < compared / 50, "{compared} compared, {left} left out");
 }
 
 #[test]
