@@ -177,7 +177,7 @@ fn measure(
         let mut bytes = vec![0; racers.len()];
         let results = race(racers.len(), settings.patience, control, |racer| {
             let method = settings.contenders[racers[racer]].method;
-            let Run { cold, warm, tree_bytes } = run(&mut working, method, &views, control)?;
+            let Run { cold, warm, tree_bytes, .. } = run(&mut working, method, &views, control)?;
             bytes[racer] = tree_bytes;
             Ok([cold, warm])
         })?;

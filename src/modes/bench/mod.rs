@@ -103,6 +103,8 @@ struct Run {
     warm: f64,
     /// Bytes of trees at the end.
     tree_bytes: usize,
+    /// Cells of trees looked at, cold and warm.
+    cells: u64,
 }
 
 /// Projects the views cold and warm.
@@ -118,7 +120,8 @@ fn run(scene: &mut Scene, method: Method, views: &[View], control: &Control) -> 
     let start = Instant::now();
     project()?;
     let warm = start.elapsed().as_secs_f64();
-    Ok(Run { cold, warm, tree_bytes: projector.forest().map_or(0, |forest| forest.tree_bytes) })
+    let forest = projector.forest().unwrap_or_default();
+    Ok(Run { cold, warm, tree_bytes: forest.tree_bytes, cells: forest.build.cells() })
 }
 
 /// The program, as reports name it.

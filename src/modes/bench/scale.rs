@@ -92,6 +92,8 @@ pub struct ScaleRow {
     pub scene_bytes: Option<u64>,
     /// Bytes of trees after the views.
     pub tree_bytes: usize,
+    /// Cells of trees looked at, cold and warm: where the cache is too small, the same ones again.
+    pub tree_cells: u64,
 }
 
 /// A straight line through logarithms.
@@ -174,18 +176,18 @@ fn measure(plan: &Plan, settings: &ScaleSettings, control: &Control, study: &mut
         let scene_bytes = held_bytes().zip(held).and_then(|(now, before)| now.checked_sub(before));
         let views: Vec<View> = scene.beam.views()?;
         let contenders = (plan.contenders)(size);
-        let mut bytes = vec![0; contenders.len()];
+        let mut trees = vec![(0, 0); contenders.len()];
         let pool = plan.threads.map(|threads| pool(threads(size))).transpose()?;
         let results = race(contenders.len(), settings.patience, control, |i| {
             let mut once = || run(&mut scene, contenders[i].method, &views, control);
-            let Run { cold, warm, tree_bytes } = match &pool {
+            let Run { cold, warm, tree_bytes, cells } = match &pool {
                 Some(pool) => pool.install(once),
                 None => once(),
             }?;
-            bytes[i] = tree_bytes;
+            trees[i] = (tree_bytes, cells);
             Ok([cold, warm])
         })?;
-        for ((contender, [cold, warm]), tree_bytes) in contenders.iter().zip(&results.times).zip(bytes) {
+        for ((contender, [cold, warm]), (tree_bytes, tree_cells)) in contenders.iter().zip(&results.times).zip(trees) {
             if !cold.0.is_empty() {
                 study.rows.push(ScaleRow {
                     size: (plan.measure)(size),
@@ -195,6 +197,7 @@ fn measure(plan: &Plan, settings: &ScaleSettings, control: &Control, study: &mut
                     load_s,
                     scene_bytes,
                     tree_bytes,
+                    tree_cells,
                 });
             }
         }
@@ -275,6 +278,7 @@ mod tests {
             load_s: 1.0,
             scene_bytes: Some((size * 1e7) as u64),
             tree_bytes: 0,
+            tree_cells: 0,
         }
     }
 

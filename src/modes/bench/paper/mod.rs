@@ -175,7 +175,7 @@ fn row(plan: &Plan, (value, trees): (f64, Trees), outcome: &Outcome, exact: &Out
         time: None,
         error: outcome.error(exact),
         memory_mb: outcome.tree_bytes as f64 / views / 1e6,
-        nodes: outcome.build.nodes_expanded as f64 / views,
+        nodes: outcome.build.cells() as f64 / views,
         samples: outcome.build.samples_taken as f64 / views,
         prunes: outcome.build.prunes as f64 / views,
         published: published.flatten(),

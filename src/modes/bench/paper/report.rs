@@ -81,7 +81,7 @@ pub struct Row {
     pub error: f64,
     /// Nodes and samples at the end, MB of 10⁶ bytes, mean of the views.
     pub memory_mb: f64,
-    /// Nodes made final or split, mean of the views; those forgotten and made again count again.
+    /// Cells looked at, mean of the views: a node each, but where the cache is too small the same ones again.
     pub nodes: f64,
     /// Lines sampled, likewise.
     pub samples: f64,
