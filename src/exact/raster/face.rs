@@ -24,9 +24,10 @@ use crate::geometry::numeric::{DoubleDouble, gamma};
 /// Where an edge crosses rows. Of its ends, the first is the lower.
 #[derive(Clone, Copy)]
 pub struct Edge {
-    low: [f64; 2],
+    pub low: [f64; 2],
     high: [f64; 2],
-    slope: f64,
+    /// Columns by row.
+    pub slope: f64,
 }
 
 impl Edge {
@@ -82,12 +83,12 @@ pub fn order([a, b, c]: [i32; 3]) -> ([usize; 3], bool) {
 /// The depth over a face: affine in column and row.
 #[derive(Clone, Copy)]
 pub struct Slope {
-    base: Place,
-    per_column: f64,
-    per_row: f64,
+    pub base: Place,
+    pub per_column: f64,
+    pub per_row: f64,
     /// Of the corners: rounding may not put a crossing off the face.
-    lowest: f64,
-    highest: f64,
+    pub lowest: f64,
+    pub highest: f64,
 }
 
 /// Which faces need a closer look: factors of their extents.

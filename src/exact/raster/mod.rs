@@ -27,6 +27,7 @@ mod patches;
 mod pixels;
 mod projection;
 mod round;
+mod rows;
 mod seen;
 mod tracer;
 
@@ -40,7 +41,7 @@ use tracer::Tracer;
 
 use super::bvh;
 use super::record::Record;
-use crate::geometry::{ClosedMesh, RayGrid, Region};
+use crate::geometry::{Bounds, ClosedMesh, RayGrid, Region};
 
 /// A closed surface made ready for the rays of one grid.
 ///
@@ -136,6 +137,21 @@ impl<'a> Form<'a> {
         };
         seen.map_or(Self::RayByRay, |seen| Self::Seen(Box::new(seen)))
     }
+}
+
+/// How many pixels of `grid` lie in the rectangle in which a body of these bounds is seen: all, if it reaches behind the source.
+pub fn pixels_around(bounds: &Bounds, grid: &RayGrid) -> u64 {
+    let projection = Projection::new(grid);
+    let sight = projection.sight(bounds);
+    let (columns, rows) = grid.size();
+    if projection.is_cone() && sight.shares[0] <= 0.0 {
+        return u64::from(columns) * u64::from(rows);
+    }
+    let within = |[low, high]: [f64; 2], count: u32| {
+        let end = f64::from(count);
+        (high.ceil().clamp(0.0, end) - low.ceil().clamp(0.0, end)) as u64
+    };
+    within(sight.columns, columns) * within(sight.rows, rows)
 }
 
 /// How far before the source or behind the pixels a body surely has no part in any ray: far above any rounding.

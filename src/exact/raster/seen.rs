@@ -161,10 +161,9 @@ impl pulp::WithSimd for Look<'_> {
         let sight = |patch: usize| {
             let patch = self.patches.get(patch);
             let count = patch.points[0].len();
-            aspect.look_at(&patch, self.projection, self.patches.are_places());
-            let [columns, rows] = aspect.extremes(count).map(|[least, greatest]| least..greatest);
+            aspect.place_points(&patch, self.projection, self.patches.are_places());
             PatchSight {
-                around: Pixels { columns, rows }.grown(1),
+                around: aspect.pixels_of_points(count).grown(1),
                 is_on_a_line: aspect.is_near_a_line(count, self.near_a_line),
             }
         };

@@ -9,10 +9,11 @@ use super::RasterView;
 use super::aspect::Aspect;
 use super::chords::{Depths, measure};
 use super::edge_on::{self, EdgeOn, is_edge_on, is_listed, pixels_along};
-use super::face::{Edge, Slope, order};
+use super::face::Slope;
 use super::patches::Patch;
 use super::pixels::Pixels;
 use super::projection::Place;
+use super::rows::{Covered, Rows};
 use super::seen::Seen;
 use crate::exact::record::{Record, Way};
 use crate::geometry::Region;
@@ -30,7 +31,8 @@ pub struct Tracer<'v, 'a> {
     pub seen: &'v Seen<'a>,
     asked: Pixels,
     pub block: Block,
-    aspect: Aspect,
+    pub aspect: Aspect,
+    pub rows: Rows,
     /// Patches near a row of blocks, and near a block.
     near: [Vec<u32>; 2],
 }
@@ -66,19 +68,12 @@ pub struct Block {
 
 /// A face that may cover pixels of a block.
 pub struct SeenFace {
+    /// In the patch that is looked at.
+    pub face: usize,
     /// In the surface.
     pub number: u32,
-    pub places: [Place; 3],
-    /// From the least ceiling of its corners' columns to the greatest.
-    pub columns: Range<i32>,
-    /// Ceilings of the corners' rows.
-    pub rows: [i32; 3],
-    /// The least, the middle and the greatest of them.
-    pub first_row: i32,
-    pub turn: i32,
-    pub last_row: i32,
-    /// The rows that are in the block.
-    pub within: Range<i32>,
+    /// Between which depths are kept.
+    limits: [f64; 2],
     /// Whether the pixels on it are listed if it is edge-on.
     is_known: bool,
 }
@@ -110,6 +105,7 @@ impl<'v, 'a> Tracer<'v, 'a> {
             asked,
             block: Block::default(),
             aspect: Aspect::default(),
+            rows: Rows::default(),
             near: Default::default(),
         }
     }
@@ -137,21 +133,29 @@ impl<'v, 'a> Tracer<'v, 'a> {
                 let block = Pixels { columns, rows: rows.clone() };
                 let [near_rows, near] = &mut self.near;
                 self.seen.list_near(&block, Some(near_rows), near);
+                if near.is_empty() && !self.seen.source_is_inside {
+                    continue;
+                }
                 match (is_by_chords, self.seen.projection.is_cone()) {
                     (true, true) => self.trace_block_of_chords::<true, S, R>(simd, &block, record),
                     (true, false) => self.trace_block_of_chords::<false, S, R>(simd, &block, record),
-                    (false, true) => self.trace_block::<true>(&block, record),
-                    (false, false) => self.trace_block::<false>(&block, record),
+                    (false, true) => self.trace_block::<true, S>(simd, &block, record),
+                    (false, false) => self.trace_block::<false, S>(simd, &block, record),
                 }
             }
         }
     }
 
     #[inline(always)]
-    fn trace_block<const CONE: bool>(&mut self, block: &Pixels, record: &mut impl Record) {
+    fn trace_block<const CONE: bool, S: pulp::Simd>(
+        &mut self,
+        simd: S,
+        block: &Pixels,
+        record: &mut impl Record,
+    ) {
         self.block.faces.clear();
         self.block.span_count = 0;
-        self.cover::<CONE>(block);
+        self.cover::<CONE, S>(simd, block);
         if self.block.span_count > 0 {
             self.measure_rays(block);
         }
@@ -175,39 +179,27 @@ impl<'v, 'a> Tracer<'v, 'a> {
     /// Goes through the faces that may cover pixels of the block, and begins the list of rays to be traced by themselves with
     /// those that lie in the faces of patches on a line of pixels.
     #[inline(always)]
-    pub fn each_face(&mut self, block: &Pixels, mut each: impl FnMut(&mut Self, &SeenFace)) {
+    pub fn each_face<const CONE: bool>(
+        &mut self,
+        block: &Pixels,
+        mut each: impl FnMut(&mut Self, &SeenFace),
+    ) {
         self.block.edge_on.clear();
         let near = std::mem::take(&mut self.near[1]);
         let seen = self.seen;
+        // Of the whole way, from the source to the pixel: shares from 0 to 1.
+        let limits = if CONE { [1.0, f64::INFINITY] } else { [0.0, 1.0] };
         for &patch_number in &near {
             let patch = seen.patches.get(patch_number as usize);
-            self.aspect.look_at(&patch, &seen.projection, seen.patches.are_places());
-            let is_on_a_line = seen.sight(patch_number).is_on_a_line;
-            if is_on_a_line {
+            self.aspect.place_points(&patch, &seen.projection, seen.patches.are_places());
+            let is_known = seen.sight(patch_number).is_on_a_line;
+            if is_known {
                 self.look_along(&patch, block);
             }
-            for (corners, &number) in patch.corners.iter().zip(patch.numbers) {
-                let ceilings = corners.map(|corner| self.aspect.ceilings(corner));
-                let columns = ceilings.map(|[column, _]| column);
-                let rows = ceilings.map(|[_, row]| row);
-                let ([left, _, right], [first_row, turn, last_row]) = (sorted(columns), sorted(rows));
-                let within = first_row.max(block.rows.start)..last_row.min(block.rows.end);
-                if within.is_empty() || left >= block.columns.end || right <= block.columns.start {
-                    continue;
-                }
-                let places = corners.map(|corner| self.aspect.place(corner));
-                let face = SeenFace {
-                    number,
-                    places,
-                    columns: left..right,
-                    rows,
-                    first_row,
-                    turn,
-                    last_row,
-                    within,
-                    is_known: is_on_a_line,
-                };
-                each(self, &face);
+            self.aspect.look_at_faces(&patch, block, seen.care, limits);
+            for i in 0..self.aspect.near_count() {
+                let face = self.aspect.near(i);
+                each(self, &SeenFace { face, number: patch.numbers[face], limits, is_known });
             }
         }
         self.near[1] = near;
@@ -218,7 +210,7 @@ impl<'v, 'a> Tracer<'v, 'a> {
     #[inline(never)]
     fn look_along(&mut self, patch: &Patch, block: &Pixels) {
         for (corners, &number) in patch.corners.iter().zip(patch.numbers) {
-            let places = corners.map(|corner| self.aspect.place(corner));
+            let places = corners.map(|corner| self.aspect.place_of_point(corner));
             if is_edge_on(places, self.seen.place_error) {
                 pixels_along(places, number, self.seen.place_error, block, &mut self.block.edge_on);
             }
@@ -227,81 +219,76 @@ impl<'v, 'a> Tracer<'v, 'a> {
 
     /// Lists the faces and what they cover.
     #[inline(always)]
-    fn cover<const CONE: bool>(&mut self, block: &Pixels) {
-        self.each_face(block, |tracer, face| tracer.cover_by::<CONE>(face, block));
+    fn cover<const CONE: bool, S: pulp::Simd>(&mut self, simd: S, block: &Pixels) {
+        self.each_face::<CONE>(block, |tracer, face| tracer.cover_by(simd, face, block));
     }
 
     #[inline(always)]
-    fn cover_by<const CONE: bool>(&mut self, face: &SeenFace, block: &Pixels) {
-        let seen = self.seen;
-        let (start, end) = (face.within.start, face.within.end);
-        let (rows, turn) = (face.rows, face.turn);
-        let [a, b, c] = face.places.each_ref();
-        let (order, is_even) = order(rows);
-        let [low, mid, high] = order.map(|i| &face.places[i]);
-        let (long, below, above) = (Edge::new(low, high), Edge::new(low, mid), Edge::new(mid, high));
-        let is_right_out = is_even != seen.projection.is_mirrored();
+    fn cover_by<S: pulp::Simd>(&mut self, simd: S, face: &SeenFace, block: &Pixels) {
+        let slope = self.slope_of(face, block);
+        let pixels = self.aspect.pixels(face.face).intersection(block);
+        let corners = [0, 1, 2].map(|corner| self.aspect.corner(face.face, corner));
+        let is_even = self.rows.find(simd, &corners, &pixels, self.seen.crossing_error);
+        let is_right_out = is_even != self.seen.projection.is_mirrored();
         let slot = self.block.faces.len() as u32;
         let block_spans = &mut self.block;
-        let needed = block_spans.span_count + (end - start) as usize;
+        let needed = block_spans.span_count + pixels.rows.len();
         if block_spans.spans.len() < needed {
             block_spans.spans.resize(2 * needed, Span::default());
         }
         let mut count = block_spans.span_count;
-        for row in start..end {
-            let by_long = long.first_right(row, seen.crossing_error);
-            let short = if row < turn { below } else { above };
-            let by_short = short.first_right(row, seen.crossing_error);
-            let start = by_long.min(by_short).max(block.columns.start);
-            let end = by_long.max(by_short).min(block.columns.end);
+        for (i, row) in pixels.rows.enumerate() {
+            let Covered { start, count: covered, is_long_left } = self.rows.covered(i);
             // Written in any case: that is faster than to ask whether there is something to write.
             block_spans.spans[count] = Span {
                 face: slot,
                 row,
                 start: (start - block.columns.start) as i16,
-                end: (end - block.columns.start) as i16,
-                is_out: (by_long < by_short) == is_right_out,
+                end: (start - block.columns.start + covered) as i16,
+                is_out: is_long_left == is_right_out,
             };
-            count += usize::from(start < end);
+            count += usize::from(covered > 0);
         }
         block_spans.span_count = count;
-        // Of the whole way, from the source to the pixel: shares from 0 to 1.
-        let limits = if CONE { [1.0, f64::INFINITY] } else { [0.0, 1.0] };
-        let (mut slope, is_sure) = Slope::new([a, b, c], seen.care, limits);
-        if !is_sure {
-            slope = self.look_closely(face, limits, block);
-        }
         self.block.faces.push(Face { slope, number: face.number });
+    }
+
+    /// The slope of a face.
+    #[inline(always)]
+    pub fn slope_of(&mut self, face: &SeenFace, block: &Pixels) -> Slope {
+        if self.aspect.is_sure(face.face) {
+            self.aspect.slope(face.face)
+        } else {
+            self.look_closely(face, block)
+        }
     }
 
     /// The slope of a face that needs care. Lists the pixels on it if it is edge-on, and those it covers if its depth there
     /// cannot be told.
     #[cold]
     #[inline(never)]
-    pub fn look_closely(&mut self, face: &SeenFace, limits: [f64; 2], block: &Pixels) -> Slope {
+    fn look_closely(&mut self, face: &SeenFace, block: &Pixels) -> Slope {
         let place_error = self.seen.place_error;
-        if !face.is_known && is_edge_on(face.places, place_error) {
-            pixels_along(face.places, face.number, place_error, block, &mut self.block.edge_on);
+        let places = [0, 1, 2].map(|corner| self.aspect.corner(face.face, corner));
+        if !face.is_known && is_edge_on(places, place_error) {
+            pixels_along(places, face.number, place_error, block, &mut self.block.edge_on);
         }
-        let (slope, is_right) = Slope::careful(face.places, self.seen.care, limits);
+        let (slope, is_right) = Slope::careful(places, self.seen.care, face.limits);
         if !is_right {
-            self.list_covered(face, block);
+            let pixels = self.aspect.pixels(face.face).intersection(block);
+            self.list_covered(&places, face.number, &pixels);
         }
         slope
     }
 
-    /// Lists the pixels that a face covers.
+    /// Lists those of some pixels that a face covers.
     #[cold]
-    fn list_covered(&mut self, face: &SeenFace, block: &Pixels) {
-        let [low, mid, high] = order(face.rows).0.map(|i| &face.places[i]);
-        let (long, below, above) = (Edge::new(low, high), Edge::new(low, mid), Edge::new(mid, high));
-        for row in face.within.clone() {
-            let short = if row < face.turn { below } else { above };
-            let ends = [long, short].map(|edge| edge.first_right(row, self.seen.crossing_error));
-            let start = ends[0].min(ends[1]).max(block.columns.start);
-            let end = ends[0].max(ends[1]).min(block.columns.end);
-            let pixel = |column| EdgeOn { row, column, face: face.number };
-            self.block.edge_on.extend((start..end).map(pixel));
+    fn list_covered(&mut self, corners: &[Place; 3], face: u32, pixels: &Pixels) {
+        self.rows.find_one_by_one(corners, pixels, self.seen.crossing_error);
+        for (i, row) in pixels.rows.clone().enumerate() {
+            let Covered { start, count, .. } = self.rows.covered(i);
+            let pixel = |column| EdgeOn { row, column, face };
+            self.block.edge_on.extend((start..start + count).map(pixel));
         }
     }
 
@@ -396,11 +383,4 @@ impl<'v, 'a> Tracer<'v, 'a> {
         }
         self.report::<CONE>(&rest, block, t_mm, record);
     }
-}
-
-/// Three numbers from the least to the greatest.
-#[inline(always)]
-pub fn sorted([a, b, c]: [i32; 3]) -> [i32; 3] {
-    let (low, high) = (a.min(b), a.max(b));
-    [low.min(c), low.max(high.min(c)), high.max(c)]
 }
