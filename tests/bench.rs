@@ -57,7 +57,7 @@ fn the_papers_figures_are_a_page_plots_and_tables_beside_its_own() {
     let output = run(folder.path(), &args);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     let table = String::from_utf8_lossy(&output.stdout);
-    assert!(table.contains("Table 1: tomatoes") && table.contains("(2.650)"), "{table}");
+    assert!(table.contains("Tomatoes: distance threshold (Table 1)") && table.contains("(2.650)"), "{table}");
 
     let report = json(&folder.path().join("p/paper.json"));
     assert_eq!((&report["complete"], &report["quick"]), (&true.into(), &true.into()));

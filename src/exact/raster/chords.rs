@@ -128,7 +128,8 @@ impl Tracer<'_, '_> {
             slope = self.look_closely(face, limits, block);
         }
         self.block.depths.is_any_set = true;
-        let outline = Outline { face: face.number, corners: [a, b, c], slope, rows: face.rows, turn: face.turn };
+        let outline =
+            Outline { face: face.number, corners: [a, b, c], slope, rows: face.rows, turn: face.turn };
         let (columns, rows) = (&face.columns, face.within.clone());
         if is_sure && columns.len() as i32 <= SMALL && face.last_row - face.first_row <= SMALL {
             self.mark_small(simd, &outline, [columns.start, face.first_row], rows, block);

@@ -8,7 +8,6 @@
 //!      ╲╱──╲╱──╲╱
 //! ```
 
-
 use super::projection::Place;
 use crate::geometry::ClosedMesh;
 
@@ -125,8 +124,7 @@ impl Patches {
     #[inline(always)]
     pub fn get(&self, patch: usize) -> Patch<'_> {
         let ([face, point], [last_face, last_point]) = (self.starts[patch], self.starts[patch + 1]);
-        let (faces, points) =
-            (face as usize..last_face as usize, point as usize..last_point as usize);
+        let (faces, points) = (face as usize..last_face as usize, point as usize..last_point as usize);
         Patch {
             corners: &self.corners[faces.clone()],
             numbers: &self.numbers[faces],

@@ -104,7 +104,14 @@ impl<'v, 'a> Tracer<'v, 'a> {
         // A grid of more than 2³⁰ columns or rows is not seen.
         let pixels = |range: &Range<u32>| range.start as i32..range.end as i32;
         let asked = Pixels { columns: pixels(&region.columns), rows: pixels(&region.rows) };
-        Self { view, seen, asked, block: Block::default(), aspect: Aspect::default(), near: Default::default() }
+        Self {
+            view,
+            seen,
+            asked,
+            block: Block::default(),
+            aspect: Aspect::default(),
+            near: Default::default(),
+        }
     }
 
     /// Traces it all, with the widest instructions that the machine has. None of them changes a bit: every operation is
@@ -120,7 +127,11 @@ impl<'v, 'a> Tracer<'v, 'a> {
         for top in common.rows.clone().step_by(BLOCK_ROWS as usize) {
             let rows = top..(top + BLOCK_ROWS).min(common.rows.end);
             let [near_rows, _] = &mut self.near;
-            self.seen.list_near(&Pixels { columns: common.columns.clone(), rows: rows.clone() }, None, near_rows);
+            self.seen.list_near(
+                &Pixels { columns: common.columns.clone(), rows: rows.clone() },
+                None,
+                near_rows,
+            );
             for left in common.columns.clone().step_by(BLOCK_COLUMNS as usize) {
                 let columns = left..(left + BLOCK_COLUMNS).min(common.columns.end);
                 let block = Pixels { columns, rows: rows.clone() };

@@ -116,7 +116,7 @@ fn csv(report: &ScaleReport) -> String {
         for row in &study.rows {
             let _ = writeln!(
                 text,
-                "\"{}\",{},{},{},{},{},{}",
+                "\"{}\",{},{},{},{},{},{},{}",
                 study.name,
                 row.size,
                 row.options,
