@@ -93,6 +93,18 @@ fn what_cannot_be_measured_is_refused_and_nothing_is_written() {
     }
 }
 
+#[test]
+fn one_study_of_scale_may_be_run_alone() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let args = ["bench", "scale", "--studies", "cache", "--quick", "--json"];
+    let output = run(folder.path(), &args);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let studies = report["studies"].as_array().expect("studies");
+    assert_eq!((studies.len(), &studies[0]["name"]), (1, &"cache, kB".into()));
+    assert_eq!(run(folder.path(), &["bench", "scale", "--studies", "giraffes"]).status.code(), Some(2));
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupted_study_leaves_a_whole_report_that_says_so() {

@@ -73,7 +73,8 @@ fn run_curve(args: &CurveArgs, session: &Session, out: &mut dyn Write) -> Result
 }
 
 fn run_scale(args: &ScaleArgs, session: &Session, out: &mut dyn Write) -> Result<()> {
-    let settings = ScaleSettings { patience: patience(&args.run), quick: args.run.quick };
+    let settings =
+        ScaleSettings { patience: patience(&args.run), quick: args.run.quick, studies: args.studies.clone() };
     let mut report = measure(session, &args.run, scale::turns(&settings), "scale", |control| {
         scale::scale(&settings, control)
     })?;

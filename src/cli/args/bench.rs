@@ -6,6 +6,7 @@ use clap::{Args, Subcommand};
 
 use super::{BeamArgs, parse_pixels};
 use crate::modes::bench::paper::{Input, input_named};
+use crate::modes::bench::scale::study_names;
 
 /// `bench`.
 #[derive(Debug, Subcommand)]
@@ -52,6 +53,15 @@ pub struct CurveArgs {
 /// `bench scale`.
 #[derive(Debug, Args)]
 pub struct ScaleArgs {
+    /// The studies to run; all if left out.
+    #[arg(
+        long,
+        value_delimiter = ',',
+        value_name = "LIST",
+        value_parser = clap::builder::PossibleValuesParser::new(study_names())
+    )]
+    pub studies: Vec<String>,
+
     /// What all benchmarks share.
     #[command(flatten)]
     pub run: RunArgs,

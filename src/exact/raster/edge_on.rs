@@ -1,7 +1,8 @@
 //! Rays in the plane of a face: the face is seen as a line, and covers nothing, yet a closed body counts the length in it.
 //!
 //! Such rays are few, and are left to the engine that can tell ([`bvh`](crate::exact::bvh)). A pixel within rounding of a
-//! face that is edge-on within rounding is one of them; no more is claimed, as the answer is exact either way.
+//! face that is edge-on within rounding is one of them; no more is claimed, as the answer is exact either way. So are the
+//! pixels of faces all but edge-on, whose depth f64 cannot tell ([`careful`](super::face::Slope::careful)).
 
 use super::pixels::Pixels;
 use super::projection::Place;

@@ -39,13 +39,13 @@ use seen::Seen;
 use tracer::Tracer;
 
 use super::bvh;
-use super::record::{Record, Way};
+use super::record::Record;
 use crate::geometry::{ClosedMesh, RayGrid, Region};
 
 /// A closed surface made ready for the rays of one grid.
 ///
 /// Crossings are exact for a surface whose vertices have moved by rounding: by γ₉₆ of the distance to the source, in pixels,
-/// over the share of the way they are at (`projection::Projection::place_error`).
+/// over the share of the way they are at (`projection::Projection::place_error`); and crossings by as much along the ray.
 /// What a ray meets does not depend on the region that it is asked in, to the last bit, nor does the order of its
 /// crossings.
 #[derive(Clone, Debug)]
@@ -97,7 +97,7 @@ impl<'a> RasterView<'a> {
             Form::Unseen => {}
             Form::RayByRay => {
                 for (ray, (column, row)) in region.places().enumerate() {
-                    self.trace_ray(ray, [column, row], 0, record);
+                    self.trace_ray(ray, [column, row], record);
                 }
             }
             Form::Seen(seen) => Tracer::new(self, seen, region).trace(record),
@@ -106,14 +106,8 @@ impl<'a> RasterView<'a> {
 
     /// Reports the crossings of a single ray by the engine for single rays.
     #[cold]
-    fn trace_ray(&self, ray: usize, [column, row]: [u32; 2], face: u32, record: &mut impl Record) {
-        let segment = self.grid.segment(column, row);
-        let mut parts = Vec::new();
-        bvh::chords(self.surface, segment.line(), &mut parts);
-        for part in parts.iter().filter_map(|part| part.intersection(&segment.reach())) {
-            record.crossing(ray, part.start(), face, Way::In);
-            record.crossing(ray, part.end(), face, Way::Out);
-        }
+    fn trace_ray(&self, ray: usize, [column, row]: [u32; 2], record: &mut impl Record) {
+        bvh::trace(self.surface, ray, &self.grid.segment(column, row), record);
     }
 }
 

@@ -102,7 +102,7 @@ impl<'a> Seen<'a> {
         let look = |&first: &usize| {
             let range = first..patches.len().min(first + PATCHES_PER_JOB);
             let sights = Look { patches: &patches, projection: &projection, range, near_a_line };
-            pulp::Arch::new().dispatch(sights)
+            crate::dispatch::arch().dispatch(sights)
         };
         let sights: Vec<Vec<PatchSight>> = jobs.par_iter().map(look).collect();
         let sights = sights.concat();

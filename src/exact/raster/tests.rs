@@ -5,9 +5,10 @@ use rand::{RngExt, SeedableRng};
 
 use super::projection::Projection;
 use super::*;
-use crate::exact::{Lengths, Pierced, Spans};
+use crate::exact::{Lengths, Pierced, Spans, Way};
+use crate::geometry::numeric::gamma;
 use crate::geometry::primitives::{block, cube, icosphere, inside_out, prism};
-use crate::geometry::{ConvexMesh, Interval, Segment, TriMesh};
+use crate::geometry::{ConvexMesh, Interval, Segment, TriMesh, Upstream};
 
 fn closed(mesh: TriMesh) -> ClosedMesh {
     ClosedMesh::new(mesh).expect("closed").0
@@ -134,6 +135,37 @@ fn needles_and_plates_are_as_exact() {
     }
 }
 
+/// A wedge whose front is seen at right angles and whose roof is seen all but edge-on: its depth is the difference of huge
+/// products there, which may put the entry before the front.
+#[test]
+fn chords_under_faces_all_but_edge_on_begin_where_the_body_does() {
+    for height in [1e-6, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12] {
+        let mut mesh = block([-40.0, -30.0, -20.0], [40.0, 30.0, 20.0]);
+        for vertex in mesh.vertices.iter_mut().filter(|v| v.y > 0.0 && v.z < 0.0) {
+            vertex.y -= height;
+        }
+        let body = closed(mesh.map_vertices(|v| DMat3::from_rotation_z(0.4) * v));
+        let convex = ConvexMesh::new(body).map_err(|refused| refused.1).expect("convex");
+        for i in 0..200 {
+            let off = 30.0 - height * f64::from(i) / 100.0;
+            let pixel = DMat3::from_rotation_z(0.4) * DVec3::new(17.3 - 0.31 * f64::from(i % 7), off, 300.0);
+            let steps = [DVec3::X, DVec3::Y];
+            let source = pixel - 800.0 * DVec3::Z;
+            for upstream in [Upstream::Source(source), Upstream::Path(800.0 * DVec3::Z)] {
+                let grid = RayGrid::new(upstream, pixel, steps, [1, 1]).expect("a grid");
+                let ray = grid.segment(0, 0);
+                let length = lengths(convex.surface(), &grid, &grid.whole())[0];
+                let shift = gamma(192) * 1100.0;
+                let [least, most] = [-shift, shift].map(|s| chord_of_parallel_body(&convex, &ray, s));
+                assert!(
+                    least - shift <= length && length <= most + shift,
+                    "{height:e}, {i}: {least} ≤ {length} ≤ {most}"
+                );
+            }
+        }
+    }
+}
+
 #[test]
 fn a_mirrored_or_oblique_grid_sees_the_same_body() {
     let source = Upstream::Source(DVec3::new(10.0, -20.0, -500.0));
@@ -228,11 +260,26 @@ fn pixels_on_vertices_and_edges_are_given_to_one_face() {
     }
 }
 
+/// Whether the ray of a pixel may lie in a face that is edge-on.
+fn is_in_a_face(surface: &ClosedMesh, grid: &RayGrid, place_error: f64, [column, row]: [i32; 2]) -> bool {
+    let projection = Projection::new(grid);
+    let pixel = Pixels { columns: column..column + 1, rows: row..row + 1 };
+    let mut found = Vec::new();
+    for face in 0..surface.mesh().faces.len() {
+        let places = surface.mesh().triangle(face).map(|v| projection.place(projection.homogeneous(v)));
+        if edge_on::is_edge_on(places, place_error) {
+            edge_on::pixels_along(places, face as u32, place_error, &pixel, &mut found);
+        }
+    }
+    !found.is_empty()
+}
+
 #[test]
 fn coverage_is_that_of_the_exact_predicate() {
     use crate::geometry::predicates::cover;
     const SEED: u64 = 42;
     let mut rng = rand_pcg::Pcg64::seed_from_u64(SEED);
+    let (mut compared, mut left) = (0, 0);
     // A tetrahedron's faces are triangles in any place; quarters of a pixel make ties.
     for _ in 0..300 {
         let mut corner = || DVec3::from([0; 3].map(|_| f64::from(rng.random_range(-40..40)) / 4.0));
@@ -244,8 +291,17 @@ fn coverage_is_that_of_the_exact_predicate() {
         let Form::Seen(seen) = &view.form else { panic!("in sight") };
         let mut pierced = Pierced::default();
         view.trace(&grid.whole(), &mut pierced);
+        // Their pixels are left to the engine for single rays.
+        let is_all_but_edge_on = |face: usize| {
+            let place = |v: DVec3| seen.projection.place(seen.projection.homogeneous(v));
+            let [a, b, c] = surface.mesh().triangle(face).map(place);
+            let limits = [0.0, 1.0];
+            !face::Slope::new([&a, &b, &c], seen.care, limits).1
+                && !face::Slope::careful([a, b, c], seen.care, limits).1
+        };
+        let all_but_edge_on = [0, 1, 2, 3].map(is_all_but_edge_on);
         for (ray, (column, row)) in grid.whole().places().enumerate() {
-            if edge_on::is_listed(seen.edge_on.as_deref().unwrap_or_default(), row as i32, column as i32) {
+            if is_in_a_face(&surface, &grid, seen.place_error, [column as i32, row as i32]) {
                 continue;
             }
             let mut found: Vec<_> =
@@ -259,9 +315,15 @@ fn coverage_is_that_of_the_exact_predicate() {
                     (winding != 0).then_some((f as u32, way))
                 })
                 .collect();
+            if expected.iter().any(|(face, _)| all_but_edge_on[*face as usize]) {
+                left += expected.len();
+                continue;
+            }
+            compared += expected.len();
             assert_eq!(found, expected, "({column}, {row})");
         }
     }
+    assert!(compared > 1_000 && left < compared / 50, "{compared} compared, {left} left out");
 }
 
 #[test]

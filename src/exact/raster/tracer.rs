@@ -117,7 +117,7 @@ impl<'v, 'a> Tracer<'v, 'a> {
     /// Traces it all, with the widest instructions that the machine has. None of them changes a bit: every operation is
     /// rounded by itself.
     pub fn trace(&mut self, record: &mut impl Record) {
-        pulp::Arch::new().dispatch(Widely { tracer: self, record });
+        crate::dispatch::arch().dispatch(Widely { tracer: self, record });
     }
 
     #[inline(always)]
@@ -274,7 +274,8 @@ impl<'v, 'a> Tracer<'v, 'a> {
         self.block.faces.push(Face { slope, number: face.number });
     }
 
-    /// The slope of a face that needs care; lists the pixels on it if it is edge-on.
+    /// The slope of a face that needs care. Lists the pixels on it if it is edge-on, and those it covers if its depth there
+    /// cannot be told.
     #[cold]
     #[inline(never)]
     pub fn look_closely(&mut self, face: &SeenFace, limits: [f64; 2], block: &Pixels) -> Slope {
@@ -282,7 +283,26 @@ impl<'v, 'a> Tracer<'v, 'a> {
         if !face.is_known && is_edge_on(face.places, place_error) {
             pixels_along(face.places, face.number, place_error, block, &mut self.block.edge_on);
         }
-        Slope::careful(face.places, limits)
+        let (slope, is_right) = Slope::careful(face.places, self.seen.care, limits);
+        if !is_right {
+            self.list_covered(face, block);
+        }
+        slope
+    }
+
+    /// Lists the pixels that a face covers.
+    #[cold]
+    fn list_covered(&mut self, face: &SeenFace, block: &Pixels) {
+        let [low, mid, high] = order(face.rows).0.map(|i| &face.places[i]);
+        let (long, below, above) = (Edge::new(low, high), Edge::new(low, mid), Edge::new(mid, high));
+        for row in face.within.clone() {
+            let short = if row < face.turn { below } else { above };
+            let ends = [long, short].map(|edge| edge.first_right(row, self.seen.crossing_error));
+            let start = ends[0].min(ends[1]).max(block.columns.start);
+            let end = ends[0].max(ends[1]).min(block.columns.end);
+            let pixel = |column| EdgeOn { row, column, face: face.number };
+            self.block.edge_on.extend((start..end).map(pixel));
+        }
     }
 
     /// The lengths of the block's rays.
@@ -300,7 +320,7 @@ impl<'v, 'a> Tracer<'v, 'a> {
     pub fn trace_edge_on(&self, record: &mut impl Record) {
         for e in &self.block.edge_on {
             let pixel = [e.column as u32, e.row as u32];
-            self.view.trace_ray(self.ray(e.row, e.column), pixel, e.face, record);
+            self.view.trace_ray(self.ray(e.row, e.column), pixel, record);
         }
     }
 

@@ -30,12 +30,19 @@ use plan::{PLANS, Plan};
 const END_OF_PATIENCE_S: f64 = 60.0;
 
 /// How far the studies go.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ScaleSettings {
     /// How long each point may take.
     pub patience: Patience,
     /// Only the first points of each study.
     pub quick: bool,
+    /// The studies to run, by their [names](study_names); all if none is named.
+    pub studies: Vec<String>,
+}
+
+/// What the studies are called.
+pub fn study_names() -> impl Iterator<Item = &'static str> {
+    PLANS.iter().map(Plan::short_name)
 }
 
 /// What was found.
@@ -117,6 +124,9 @@ pub fn turns(settings: &ScaleSettings) -> u64 {
 }
 
 fn sizes(plan: &Plan, settings: &ScaleSettings) -> Vec<u32> {
+    if !settings.studies.is_empty() && !settings.studies.iter().any(|name| name == plan.short_name()) {
+        return Vec::new();
+    }
     let count = if settings.quick { plan.quick_sizes } else { plan.sizes.len() };
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let is_there = |&&size: &&u32| plan.threads.is_none_or(|threads| threads(size) <= cores);
