@@ -57,12 +57,12 @@ fn the_papers_figures_are_a_page_plots_and_tables_beside_its_own() {
     let output = run(folder.path(), &args);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     let table = String::from_utf8_lossy(&output.stdout);
-    assert!(table.contains("Table 1: tomatoes") && table.contains("(2.650)"), "{table}");
+    assert!(table.contains("Tomatoes: distance threshold (Table 1)") && table.contains("(2.650)"), "{table}");
 
     let report = json(&folder.path().join("p/paper.json"));
     assert_eq!((&report["complete"], &report["quick"]), (&true.into(), &true.into()));
     let sweeps = report["sweeps"].as_array().expect("sweeps");
-    assert_eq!(sweeps.len(), 3, "thresholds of the tomatoes; threshold and depth of the phantom");
+    assert_eq!(sweeps.len(), 2, "thresholds of the tomatoes and of the phantom");
     let rows = sweeps[0]["rows"].as_array().expect("rows");
     assert!(rows.iter().all(|row| row["flop_speed_up"].as_f64().is_some_and(|s| s > 0.0)), "{rows:?}");
     assert_eq!(rows[0]["published"]["cpu_speed_up"], 1.89);
@@ -70,10 +70,10 @@ fn the_papers_figures_are_a_page_plots_and_tables_beside_its_own() {
 
     let csv = std::fs::read_to_string(folder.path().join("p/paper.csv")).expect("a table");
     let columns: Vec<usize> = csv.lines().map(|line| line.split(',').count()).collect();
-    assert!(columns.len() == 1 + 1 + 2 + 2 && columns.iter().all(|n| *n == columns[0]), "{columns:?}");
+    assert!(columns.len() == 1 + 1 + 2 && columns.iter().all(|n| *n == columns[0]), "{columns:?}");
     let page = std::fs::read_to_string(folder.path().join("p/paper.html")).expect("a page");
     assert!(page.contains("<svg") && !page.contains("NaN") && !page.contains("src=\"http"));
-    let plot = folder.path().join("p/paper-adult-depth-speed-up.svg");
+    let plot = folder.path().join("p/paper-adult-distance-speed-up.svg");
     assert!(std::fs::read_to_string(plot).expect("a plot").starts_with("<svg xmlns"));
 }
 

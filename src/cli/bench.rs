@@ -26,7 +26,7 @@ const HURRY: Patience = Patience { rounds: 3, seconds: 0.5 };
 const SMALL: u64 = 600 * 600;
 
 /// Sides of the paper's pictures in a hurry, as a share.
-const QUICK_SCALE: f64 = 0.125;
+const QUICK_SCALE: f64 = 0.1;
 
 /// Measures, writes the report if a folder is named, and says its sum on `out`. What was measured before an interruption is
 /// written and said, too.

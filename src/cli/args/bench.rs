@@ -80,7 +80,7 @@ pub struct PaperArgs {
     )]
     pub scenes: Vec<Input>,
 
-    /// The pictures' sides as a share of the paper's; 1 if left out, an eighth with --quick.
+    /// The pictures' sides as a share of the paper's; 1 if left out, a tenth with --quick.
     #[arg(long, value_name = "SHARE")]
     pub scale: Option<f64>,
 

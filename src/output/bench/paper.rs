@@ -73,6 +73,10 @@ fn plots(sweep: &Sweep) -> Vec<(&'static str, Curves<'static>)> {
         return plots;
     }
     plots.insert(0, ("error", plot("mean error", Spacing::Linear, errors)));
+    if sweep.dial == Dial::AngularThreshold {
+        // It chooses among answers; the trees are the same.
+        return plots;
+    }
     plots.push((
         "memory",
         plot("MB", Spacing::Logarithmic, both("nodes and samples, MB", 3, memory).to_vec()),
@@ -81,7 +85,7 @@ fn plots(sweep: &Sweep) -> Vec<(&'static str, Curves<'static>)> {
 }
 
 fn heading(sweep: &Sweep) -> String {
-    format!("{}: {}, {}", sweep.place, sweep.input.title(), sweep.dial.title())
+    format!("{}: {} ({})", sweep.input.title(), sweep.dial.title(), sweep.place)
 }
 
 fn page(report: &PaperReport) -> String {

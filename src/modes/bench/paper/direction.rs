@@ -79,13 +79,14 @@ pub fn trend(series: &Series, way: Way) -> Option<Claim> {
     let steps = series.ours.windows(2).map(|w| sign * (w[1][1] - w[0][1]));
     let back: f64 = steps.map(|step| (-step).max(0.0)).sum();
     let holds = whole > 0.0 && back <= MOST_BACK * whole;
-    let verb = match (way, holds, back > 0.0) {
-        (Way::Rises, true, false) => "rises",
-        (Way::Rises, true, true) => "rises on the whole",
-        (Way::Rises, false, _) => "does not rise",
-        (Way::Falls, true, false) => "falls",
-        (Way::Falls, true, true) => "falls on the whole",
-        (Way::Falls, false, _) => "does not fall",
+    let verb = match (way, holds) {
+        (_, false) if whole > 0.0 => "goes up and down",
+        (Way::Rises, false) => "does not rise",
+        (Way::Falls, false) => "does not fall",
+        (Way::Rises, true) if back == 0.0 => "rises",
+        (Way::Falls, true) if back == 0.0 => "falls",
+        (Way::Rises, true) => "rises on the whole",
+        (Way::Falls, true) => "falls on the whole",
     };
     let from_to = |points: &[[f64; 2]]| match points {
         [first, .., last] => {
@@ -174,6 +175,10 @@ mod tests {
         assert!(rises(&[1.0, 2.0, 3.0]) && rises(&[1.0, 3.0, 2.8]));
         assert!(!rises(&[1.0, 3.0, 1.2]) && !rises(&[1.0, 1.0]) && !rises(&[2.0, 1.0]));
         assert!(!rises(&[1.0, 3.0, 2.0, 2.5]), "back by two thirds of the way");
+        let words = |values: &[f64]| trend(&series(values), Way::Rises).expect("enough").words;
+        assert_eq!(words(&[1.0, 3.0, 2.8]), "it rises on the whole, from 1.00 at 1 to 2.80 at 3");
+        assert_eq!(words(&[1.0, 3.0, 1.2]), "it goes up and down, from 1.00 at 1 to 1.20 at 3");
+        assert_eq!(words(&[2.0, 1.0]), "it does not rise, from 2.00 at 1 to 1.00 at 2");
         assert!(trend(&series(&[3.0, 2.0, 1.0]), Way::Falls).expect("enough").holds);
         assert!(!trend(&series(&[1.0, 2.0]), Way::Falls).expect("enough").holds);
         assert_eq!(trend(&series(&[1.0]), Way::Rises), None);

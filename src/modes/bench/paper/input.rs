@@ -60,10 +60,10 @@ impl Input {
     pub fn title(self) -> &'static str {
         match self {
             Self::BezierSurface => "Bezier surface",
-            Self::RandomVolumes => "random volumes",
-            Self::RandomVolumesAbsorption => "random volumes, absorption",
-            Self::Tomatoes => "tomatoes",
-            Self::Adult => "adult phantom, absorption",
+            Self::RandomVolumes => "Random volumes",
+            Self::RandomVolumesAbsorption => "Random volumes, absorption",
+            Self::Tomatoes => "Tomatoes",
+            Self::Adult => "Adult phantom, absorption",
         }
     }
 

@@ -67,7 +67,9 @@ impl PaperSettings {
     }
 
     fn plans(&self) -> impl Iterator<Item = &'static Plan> {
-        PLANS.iter().filter(|plan| self.inputs.contains(&plan.input))
+        let is_wanted =
+            |plan: &&Plan| self.inputs.contains(&plan.input) && !plan.settings(self.quick).is_empty();
+        PLANS.iter().filter(is_wanted)
     }
 
     fn size(&self, plan: &Plan) -> [u32; 2] {

@@ -14,7 +14,7 @@ fn settings(inputs: &[Input]) -> PaperSettings {
 #[test]
 fn a_sweep_has_errors_memory_and_times_at_each_value_and_no_operations_where_they_are_not_counted() {
     let report = paper(&settings(&[Input::Adult]), &Control::none()).expect("a report");
-    assert!(report.complete && report.sweeps.len() == 2);
+    assert!(report.complete && report.sweeps.len() == 1);
     for sweep in &report.sweeps {
         assert!(sweep.exact.time.is_some_and(|t| t.seconds > 0.0 && t.rounds == 2), "{sweep:?}");
         assert_eq!((sweep.size, sweep.rows.len()), ([6, 6], 2));
