@@ -102,8 +102,10 @@ fn once(body: &Body, engine: Engine, rays: &RaySet) -> f64 {
     let one_of = if engine == Engine::Raster { 1 } else { (rays.count() / ENOUGH).clamp(1, 16) };
     let parts = || parts.iter().step_by(one_of);
     let count: usize = parts().map(|part| part.pixels()).sum();
-    let mut lengths = vec![0.0; count];
+    // Written once before, so that no page is new.
+    let mut lengths = vec![f64::NAN; count];
     let start = Instant::now();
+    lengths.fill(0.0);
     let mut rest = &mut lengths[..];
     match rays {
         RaySet::Grid(grid) => {

@@ -25,19 +25,26 @@ pub(super) const FEW_PLANES: usize = 100;
 /// Costs of one thread, in nanoseconds, by which engines are chosen for an image: measured (`cargo bench --bench table -- choice`
 /// in `benches`), on bodies of eighty to a third of a million faces. Only their ratios matter.
 mod cost {
-    /// To place a face and to find the pixels it covers.
-    pub const RASTER_FACE: f64 = 40.0;
-    /// To find lengths from what faces cover, for each pixel of the body's rectangle.
-    pub const RASTER_PIXEL: f64 = 4.0;
+    /// To look at a face.
+    const RASTER_FACE: f64 = 11.0;
+    /// To find what it covers, by as many rows as a square of its pixels has.
+    const RASTER_ROW: f64 = 46.0;
+    /// To find lengths from that, for each pixel of the body's rectangle.
+    const RASTER_PIXEL: f64 = 2.2;
 
-    /// A walk from the neighbouring pixel, over so many faces.
-    pub fn walk_pixel(faces: f64) -> f64 {
-        30.0 + 2.0 * faces.cbrt()
+    /// To see so many faces in so many pixels.
+    pub fn raster(faces: f64, pixels: f64) -> f64 {
+        RASTER_FACE * faces + RASTER_ROW * (faces * pixels).sqrt() + RASTER_PIXEL * pixels
     }
 
-    /// A descent of the hierarchy.
-    pub fn bvh_pixel(faces: f64) -> f64 {
-        150.0 + 7.0 * faces.cbrt()
+    /// To walk for so many pixels, each from its neighbour, which is many faces away if pixels are few.
+    pub fn walk(faces: f64, pixels: f64) -> f64 {
+        (50.0 + 4.0 * faces.sqrt().sqrt()) * pixels + 80.0 * (faces * pixels).sqrt()
+    }
+
+    /// To descend the hierarchy for each pixel.
+    pub fn bvh(faces: f64, pixels: f64) -> f64 {
+        (190.0 + 18.0 * faces.sqrt().sqrt()) * pixels
     }
 }
 
@@ -66,12 +73,11 @@ impl Body {
     pub fn engine_for_image(&self, grid: &RayGrid) -> Engine {
         let pixels = raster::pixels_around(&self.bounds(), grid) as f64;
         let faces = self.surface().mesh().faces.len() as f64;
-        let raster = faces * cost::RASTER_FACE + pixels * cost::RASTER_PIXEL;
         let (other, cost) = match self.convexity() {
-            Ok(_) => (Engine::Walk, pixels * cost::walk_pixel(faces)),
-            Err(_) => (Engine::Bvh, pixels * cost::bvh_pixel(faces)),
+            Ok(_) => (Engine::Walk, cost::walk(faces, pixels)),
+            Err(_) => (Engine::Bvh, cost::bvh(faces, pixels)),
         };
-        if cost < raster { other } else { Engine::Raster }
+        if cost < cost::raster(faces, pixels) { other } else { Engine::Raster }
     }
 
     /// The quickest engine for rays in no order.

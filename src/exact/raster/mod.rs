@@ -12,8 +12,8 @@
 //! A vertex is rounded once, for all its faces, and what they cover is exact for its rounded place: a closed surface is
 //! seen as a closed complex of triangles, so that every ray goes in as often as out, whatever the pixels hit.
 //!
-//! Faces that lie together are seen as a patch (`patches`), or passed over as a whole. Of a convex body, only the two depths of a
-//! pixel are kept, and its length is one quotient (`chords`).
+//! Faces that lie together are seen as a patch (`patches`), or passed over as a whole. Where a convex
+//! body's faces are small, only the two depths of a pixel are kept, and its length is one quotient (`chords`).
 //!
 //! Scan conversion with the usual fill rule (Pineda 1988, doi:10.1145/54852.378457), made exact as Shewchuk's adaptive
 //! predicates are: by a float where that can tell, by an exact sign where it cannot.
@@ -83,7 +83,8 @@ impl<'a> RasterView<'a> {
         Self { surface, grid: *grid, form, is_convex: false }
     }
 
-    /// The same for a surface that is convex but for rounding: its rays go in and out once, which is quicker.
+    /// The same for a surface that is convex but for rounding: its rays go in and out once, which is quicker
+    /// where faces are small.
     /// Lengths may then differ in the last bits from those beside [`Pierced`](super::Pierced) faces.
     pub fn as_convex(self) -> Self {
         Self { is_convex: true, ..self }

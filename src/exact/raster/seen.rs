@@ -5,13 +5,13 @@ use std::borrow::Cow;
 use rayon::prelude::*;
 
 use super::aspect::Aspect;
-use super::edge_on;
 use super::face::Care;
 use super::near::Cut;
 use super::patches::Patches;
 use super::pixels::Pixels;
 use super::projection::{Projection, Sight};
 use super::round;
+use super::{chords, edge_on};
 use crate::geometry::numeric::gamma;
 use crate::geometry::{ClosedMesh, RayGrid, Upstream};
 
@@ -25,6 +25,8 @@ pub struct Seen<'a> {
     /// The pixels that a face may cover.
     pub bounds: Pixels,
     pub source_is_inside: bool,
+    /// Whether faces cover few pixels each, and the source is not inside: see `chords`.
+    pub is_fine: bool,
     pub crossing_error: f64,
     pub place_error: f64,
     pub care: Care,
@@ -108,7 +110,9 @@ impl<'a> Seen<'a> {
         let sights = sights.concat();
         let all = sights.iter().fold(Pixels::NONE, |all, sight| all.union(&sight.around));
         let bounds = if source_is_inside { window.clone() } else { all.intersection(window) };
+        let pixels = bounds.columns.len() * bounds.rows.len();
         Some(Self {
+            is_fine: !source_is_inside && pixels <= chords::MOST_PIXELS * patches.face_count(),
             projection,
             patches,
             sights,

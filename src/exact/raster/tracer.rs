@@ -118,7 +118,7 @@ impl<'v, 'a> Tracer<'v, 'a> {
 
     #[inline(always)]
     fn trace_blocks<S: pulp::Simd, R: Record>(&mut self, simd: S, record: &mut R) {
-        let is_by_chords = self.view.is_convex && !self.seen.source_is_inside && !R::ASKS_FACES;
+        let is_by_chords = self.view.is_convex && self.seen.is_fine && !R::ASKS_FACES;
         let common = self.asked.intersection(&self.seen.bounds);
         for top in common.rows.clone().step_by(BLOCK_ROWS as usize) {
             let rows = top..(top + BLOCK_ROWS).min(common.rows.end);

@@ -153,7 +153,7 @@ impl Walker {
     /// As exact as clipping: the planes are the same, and the faces those pierced once the vertices have moved by no more
     /// than γ₈ of their distance from the line's origin (see `shear`). On a line within that of a vertex, two of its faces
     /// are looked at, not all, and the ends may be off by a hundred times as much.
-    #[inline]
+    #[inline(always)]
     pub fn pass_from(&self, origin: DVec3, dir: DVec3, seeds: &mut Seeds) -> Result<Option<Pass>, Unsure> {
         let view = LineView::new(self, origin, dir);
         let (mut entry, mut exit) =

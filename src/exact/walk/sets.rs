@@ -13,7 +13,7 @@ use crate::geometry::{Interval, RayGrid, Region, Segment, Upstream};
 /// Bodies of fewer faces stay in the second-level cache, where reading ahead gains nothing.
 const FACES_IN_CACHE: usize = 10_000;
 
-/// Over bodies of as many faces, walks in any order wait for memory, and are quicker abreast.
+/// Over bodies of as many faces walks wait for memory, and are quicker abreast.
 const MANY_FACES: usize = 80_000;
 
 /// Bodies of as many faces have none that serves many rays of an image.
@@ -36,7 +36,7 @@ impl Walker {
             Upstream::Source(source) if is_coarse => {
                 self.trace_rows(grid, region, record, other, &mut Followers::new(source));
             }
-            _ if is_coarse || region.rows.len() < WORTH_IT => {
+            _ if self.faces.len() < MANY_FACES || region.rows.len() < WORTH_IT => {
                 self.trace_rows(grid, region, record, other, &mut Alone);
             }
             _ => self.trace_rows_abreast(grid, region, record, other),
