@@ -187,7 +187,9 @@ fn measure(plan: &Plan, settings: &ScaleSettings, control: &Control, study: &mut
             trees[i] = (tree_bytes, cells);
             Ok([cold, warm])
         })?;
-        for ((contender, [cold, warm]), (tree_bytes, tree_cells)) in contenders.iter().zip(&results.times).zip(trees) {
+        for ((contender, [cold, warm]), (tree_bytes, tree_cells)) in
+            contenders.iter().zip(&results.times).zip(trees)
+        {
             if !cold.0.is_empty() {
                 study.rows.push(ScaleRow {
                     size: (plan.measure)(size),
