@@ -11,7 +11,7 @@
 //!
 //! **The law:** what becomes of a cell is a pure function of the cell. So the answer to a line depends neither on the
 //! order of queries, nor on threads, nor on what the cache still holds; where the cache has no room, the cells on the
-//! way are computed, used and forgotten.
+//! way are computed, used and forgotten, but for what whoever asks remembers from one line to the next ([`Descent`]).
 //!
 //! Threads share a tree without locks on the way down: a node's halves and its final samples are written once. Only
 //! the expansion of a node takes that node's lock.

@@ -48,7 +48,8 @@ pub struct TreeSettings {
     pub cache_bytes: usize,
     /// The share of the cache that pruning keeps.
     pub kept_share: f64,
-    /// Bodies with fewer face planes than this are clipped: that is cheaper than a query.
+    /// Bodies with fewer face planes than this are clipped: that is cheaper than a query. Asked one beside the other, warm, a
+    /// quadrilinear query is as dear as clipping some 40 planes (70 while the tree is built, 150 or more of rays in no order).
     pub least_planes: usize,
 }
 
