@@ -68,14 +68,30 @@ impl<'s> Shaft<'s> {
 
     /// Whether no line of the cell meets the body, proved by one plane that has all of it behind.
     pub fn misses_all(&self) -> bool {
-        let mut planes = self.planes.iter();
-        planes.any(|&(n, least)| self.surface.farthest_vertex(n, self.origin, least).is_none())
+        self.planes.iter().any(|&(n, least)| {
+            let is_met = std::cell::Cell::new(false);
+            let reaches = |p: DVec3| n.dot(p - self.origin) >= least;
+            self.surface.tree().visit(
+                |b| !is_met.get() && reaches(DVec3::select(n.cmpge(DVec3::ZERO), b.max, b.min)),
+                |f| {
+                    is_met.set(
+                        is_met.get() || self.surface.mesh().triangle(f as usize).into_iter().any(reaches),
+                    )
+                },
+            );
+            !is_met.get()
+        })
     }
 
     /// Whether a plane parts the shaft from the hull of some points.
     fn misses(&self, points: &[DVec3]) -> bool {
         let is_behind = |(n, least): &(DVec3, f64)| points.iter().all(|p| n.dot(*p - self.origin) < *least);
         self.planes.iter().any(is_behind)
+    }
+
+    /// Whether a point of the body lies in the shaft, so that a line of the cell meets it.
+    pub fn holds(&self, point: DVec3) -> bool {
+        self.planes.iter().all(|&(n, least)| n.dot(point - self.origin) >= least)
     }
 
     fn misses_box(&self, bounds: &Bounds) -> bool {
