@@ -75,13 +75,7 @@ fn main() -> Result<()> {
         for size in [600, 2048] {
             if options.wants(&size.to_string(), &all) && !(options.quick && size == 2048) {
                 let grid = view::window(body.surface().mesh(), size);
-                views(
-                    out,
-                    &format!("{size}²"),
-                    &body,
-                    &[grid],
-                    tolerances,
-                )?;
+                views(out, &format!("{size}²"), &body, &[grid], tolerances)?;
             }
         }
         if options.wants("quadrilinear", &all) {

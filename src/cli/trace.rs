@@ -97,16 +97,16 @@ fn run_in<R: Real>(args: &TraceArgs, session: &Session, out: &mut dyn Write) -> 
     }
     let exact =
         args.compare.then(|| compare::<R>(&world, args, &samples, session, &pictures, &run)).transpose()?;
-    let settings = match tracing {
-        Tracing::RiTree(settings) => Some(settings),
-        Tracing::Exact => None,
+    let (method, settings) = match tracing {
+        Tracing::RiTree(settings) => (MethodArg::Ritree, Some(settings)),
+        Tracing::Exact => (MethodArg::Exact, None),
     };
     let record = Record {
         scene: world.name.clone(),
         objects: world.objects.len(),
         size: args.size,
         samples: args.samples,
-        method: args.method.method.name(),
+        method: method.name(),
         settings,
         views: pictures.len(),
         threads: rayon::current_num_threads(),

@@ -8,6 +8,7 @@ use super::Engine;
 use super::Record;
 use super::bvh::Bvh;
 use super::clip::ConvexClipper;
+use super::raster::Patches;
 use super::walk::{Unsure, Walker};
 use crate::geometry::{
     Bounds, ClosedMesh, ConvexMesh, Interval, Line, NotConvex, RayGrid, Region, Segment, ball_of_inertia,
@@ -18,6 +19,7 @@ use crate::geometry::{
 pub struct Body {
     form: Form,
     bvh: OnceLock<Bvh>,
+    patches: OnceLock<Patches>,
 }
 
 #[derive(Clone, Debug)]
@@ -47,7 +49,7 @@ impl Body {
                 Form::General { surface, why }
             }
         };
-        Self { form, bvh: OnceLock::new() }
+        Self { form, bvh: OnceLock::new(), patches: OnceLock::new() }
     }
 
     /// Its surface.
@@ -101,9 +103,14 @@ impl Body {
         self.bvh.get_or_init(|| Bvh::new(self.surface()))
     }
 
+    /// Its faces in patches, for the raster.
+    pub fn patches(&self) -> &Patches {
+        self.patches.get_or_init(|| Patches::new(self.surface()))
+    }
+
     /// Forgets what engines have made ready; the next to be used makes it again. For measuring what that costs.
     pub fn forget_engines(&mut self) {
-        self.bvh = OnceLock::new();
+        (self.bvh, self.patches) = (OnceLock::new(), OnceLock::new());
         if let Form::Convex(convex) = &mut self.form {
             convex.walker = OnceLock::new();
         }

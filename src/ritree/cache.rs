@@ -1,6 +1,7 @@
 //! A promise about memory, shared by all trees of a run.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{PoisonError, RwLock};
 
 /// Counts the bytes of nodes and samples, and refuses what would exceed the limit.
 #[derive(Debug)]
@@ -49,6 +50,30 @@ impl Cache {
     /// Gives room back.
     pub fn release(&self, bytes: usize) {
         self.used_bytes.fetch_sub(bytes, Ordering::Relaxed);
+    }
+
+    /// Makes room if something was refused: what was used last among all trees under this cache is kept up to
+    /// `kept_share` of the limit, the rest is forgotten. `collect` adds the trees' stamps, see
+    /// [`RiTree::collect_stamps`](super::RiTree::collect_stamps), `prune` forgets what is older than the stamp it is given.
+    pub fn prune_if_full<T>(
+        &self,
+        trees: &RwLock<T>,
+        kept_share: f64,
+        collect: impl FnOnce(&T, &mut Vec<(u32, usize)>),
+        prune: impl FnOnce(&mut T, u32),
+    ) {
+        if !self.is_full() {
+            return;
+        }
+        let mut trees = trees.write().unwrap_or_else(PoisonError::into_inner);
+        if !self.is_full() {
+            // Another thread was first.
+            return;
+        }
+        let mut stamps = Vec::new();
+        collect(&trees, &mut stamps);
+        prune(&mut trees, oldest_to_keep(stamps, (kept_share * self.limit_bytes as f64) as usize));
+        self.relieved();
     }
 }
 

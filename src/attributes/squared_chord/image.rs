@@ -121,7 +121,7 @@ impl<'a> ImageChords<'a> {
         if pixels.iter().next().is_none() {
             return;
         }
-        let arch = pulp::Arch::new();
+        let arch = crate::dispatch::arch();
         let mut factors = RowFactors::new();
         self.lines.by_dominant_axis(&pixels, |axis, sign, pixels| {
             let forms = self.lines.forms(axis, sign);

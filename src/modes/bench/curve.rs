@@ -1,5 +1,7 @@
 //! Error against time, for every method and setting, on one scene.
 
+mod front;
+
 use serde::Serialize;
 
 use super::race::{LEAST_ROUNDS, race};
@@ -11,6 +13,7 @@ use crate::modes::audit::{Audit, AuditSettings, DEFAULT_TOLERANCE_MM, RaySet};
 use crate::modes::figures::Figures;
 use crate::scene::beam::{BeamSpec, DetectorSpec};
 use crate::scene::{Given, Scene, View};
+use front::{mark_fronts, recommendation};
 
 /// Errors are found on the views' rays through so many pixels a side at most. A length depends on its ray alone, so the
 /// rays of a finer image have errors like theirs.
@@ -174,7 +177,7 @@ fn measure(
         let mut bytes = vec![0; racers.len()];
         let results = race(racers.len(), settings.patience, control, |racer| {
             let method = settings.contenders[racers[racer]].method;
-            let Run { cold, warm, tree_bytes } = run(&mut working, method, &views, control)?;
+            let Run { cold, warm, tree_bytes, .. } = run(&mut working, method, &views, control)?;
             bytes[racer] = tree_bytes;
             Ok([cold, warm])
         })?;
@@ -233,7 +236,7 @@ fn errors(
 }
 
 /// The scene's views on a detector of so many pixels.
-fn views(scene: &Scene, pixels: [u32; 2]) -> Result<Vec<View>> {
+pub(super) fn views(scene: &Scene, pixels: [u32; 2]) -> Result<Vec<View>> {
     let detector = DetectorSpec { pixels: Some(Given::from(pixels)), ..DetectorSpec::default() };
     let beam = scene.beam.clone().overridden_by(BeamSpec { detector, ..BeamSpec::default() });
     Ok(beam.views()?)
@@ -241,74 +244,6 @@ fn views(scene: &Scene, pixels: [u32; 2]) -> Result<Vec<View>> {
 
 fn area([columns, rows]: [u32; 2]) -> f64 {
     f64::from(columns) * f64::from(rows)
-}
-
-/// The mean error that counts: none where it is rounding.
-fn weight(row: &CurveRow) -> f64 {
-    if row.exact { 0.0 } else { row.error_mm.mean }
-}
-
-fn mark_fronts(rows: &mut [CurveRow]) {
-    let is_beaten = |row: &CurveRow, time: &dyn Fn(&CurveRow) -> f64| {
-        rows.iter().filter(|other| other.pixels == row.pixels).any(|other| {
-            let no_worse = time(other) <= time(row) && weight(other) <= weight(row);
-            no_worse && (time(other) < time(row) || weight(other) < weight(row))
-        })
-    };
-    let marks: Vec<[bool; 2]> = rows
-        .iter()
-        .map(|row| [!is_beaten(row, &|r| r.cold.seconds), !is_beaten(row, &|r| r.warm.seconds)])
-        .collect();
-    for (row, [cold, warm]) in rows.iter_mut().zip(marks) {
-        (row.on_cold_front, row.on_warm_front) = (cold, warm);
-    }
-}
-
-/// What to use for the largest images measured.
-fn recommendation(report: &CurveReport) -> Option<String> {
-    let pixels = report.rows.last()?.pixels;
-    let rows: Vec<&CurveRow> = report.rows.iter().filter(|row| row.pixels == pixels).collect();
-    let quickest = |time: fn(&CurveRow) -> f64, rows: &[&CurveRow]| -> Option<CurveRow> {
-        rows.iter().min_by(|a, b| time(a).total_cmp(&time(b))).map(|row| (*row).clone())
-    };
-    let exact: Vec<&CurveRow> = rows.iter().copied().filter(|row| row.exact).collect();
-    let best = quickest(|row| row.cold.seconds, &exact)?;
-    let mut text = format!(
-        "For {} of {}×{} pixels on this machine use `{}`: exact, {} s",
-        if report.views == 1 { "a view".into() } else { format!("{} views", report.views) },
-        pixels[0],
-        pixels[1],
-        best.options,
-        seconds(best.cold.seconds)
-    );
-    let best_warm = quickest(|row| row.warm.seconds, &exact)?;
-    let rivals = [
-        ("from cold", best.cold.seconds, (|row| row.cold.seconds) as fn(&CurveRow) -> f64),
-        ("once warm", best_warm.warm.seconds, |row| row.warm.seconds),
-    ];
-    for (when, to_beat, time) in rivals {
-        let inexact: Vec<&CurveRow> =
-            rows.iter().copied().filter(|row| !row.exact && time(row) < to_beat).collect();
-        // Of those that are quicker, the most accurate.
-        let rival = inexact.iter().min_by(|a, b| a.error_mm.mean.total_cmp(&b.error_mm.mean));
-        text += &match rival {
-            None => format!("; {when}, nothing inexact was quicker"),
-            Some(row) => format!(
-                "; {when}, `{}` takes {} s with errors of {} mm on average and {} mm in 99.9 % of lengths",
-                row.options,
-                seconds(time(row)),
-                seconds(row.error_mm.mean),
-                seconds(row.error_mm.p999)
-            ),
-        };
-    }
-    Some(text + ".")
-}
-
-/// A number to two digits.
-fn seconds(value: f64) -> String {
-    let decimals = (1 - value.abs().max(1e-9).log10().floor() as i32).clamp(0, 9);
-    format!("{value:.*}", decimals as usize)
 }
 
 #[cfg(test)]

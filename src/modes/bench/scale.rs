@@ -12,29 +12,37 @@
 //! Exponents are slopes of straight lines through the logarithms of the upper half of the sizes, by least squares: cost ∝
 //! size^exponent. Where a run would take a minute is told by the straight line through the last two sizes' times.
 
+mod plan;
+
 use std::time::Instant;
 
 use serde::Serialize;
 
 use super::machine::held_bytes;
 use super::race::race;
-use super::{Contender, Dial, Machine, Patience, Program, Run, Times, run};
+use super::{Machine, Patience, Program, Run, Times, run};
 use crate::error::{Error, Result};
-use crate::exact::Engine;
 use crate::modes::Control;
-use crate::modes::project::Method;
 use crate::scene::{Folder, Scene, SceneText, View};
+use plan::{PLANS, Plan};
 
 /// Where time is said to stop: a run of so many seconds.
 const END_OF_PATIENCE_S: f64 = 60.0;
 
 /// How far the studies go.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ScaleSettings {
     /// How long each point may take.
     pub patience: Patience,
     /// Only the first points of each study.
     pub quick: bool,
+    /// The studies to run, by their [names](study_names); all if none is named.
+    pub studies: Vec<String>,
+}
+
+/// What the studies are called.
+pub fn study_names() -> impl Iterator<Item = &'static str> {
+    PLANS.iter().map(Plan::short_name)
 }
 
 /// What was found.
@@ -84,6 +92,8 @@ pub struct ScaleRow {
     pub scene_bytes: Option<u64>,
     /// Bytes of trees after the views.
     pub tree_bytes: usize,
+    /// Cells of trees looked at, cold and warm: where the cache is too small, the same ones again.
+    pub tree_cells: u64,
 }
 
 /// A straight line through logarithms.
@@ -104,127 +114,6 @@ pub struct Fit {
     pub size_at_full_memory: Option<f64>,
 }
 
-/// What a study consists of.
-struct Plan {
-    name: &'static str,
-    setup: &'static str,
-    sizes: &'static [u32],
-    /// How many of the sizes a quick run measures.
-    quick_sizes: usize,
-    scene: fn(u32) -> String,
-    contenders: fn(u32) -> Vec<Contender>,
-    /// What grows, in its own unit.
-    measure: fn(u32) -> f64,
-    /// The threads at a size, if they are what grows.
-    threads: Option<fn(u32) -> usize>,
-    is_fitted: bool,
-}
-
-const PLANS: [Plan; 6] = [
-    Plan {
-        name: "faces",
-        setup: "one ellipsoid, one view of 600×600",
-        sizes: &[1_280, 5_120, 20_480, 81_920, 200_000],
-        quick_sizes: 3,
-        scene: |faces| scene_text(1, faces, 600, "0"),
-        contenders: |_| all(),
-        measure: f64::from,
-        threads: None,
-        is_fitted: true,
-    },
-    Plan {
-        name: "pixels",
-        setup: "one ellipsoid of 20 000 faces, one view",
-        sizes: &[150, 300, 600, 1_200, 2_400],
-        quick_sizes: 3,
-        scene: |side| scene_text(1, 20_000, side, "0"),
-        contenders: |_| all(),
-        measure: |side| f64::from(side) * f64::from(side),
-        threads: None,
-        is_fitted: true,
-    },
-    Plan {
-        name: "views",
-        setup: "one ellipsoid of 5 000 faces, an orbit of 256×256",
-        sizes: &[1, 4, 16, 64],
-        quick_sizes: 3,
-        scene: |views| scene_text(1, 5_000, 256, &format!("0..360:{}", 360.0 / f64::from(views))),
-        contenders: |_| all(),
-        measure: f64::from,
-        threads: None,
-        is_fitted: true,
-    },
-    Plan {
-        name: "organs",
-        setup: "ellipsoids of 2 000 faces on a grid, one view of 600×600",
-        sizes: &[1, 8, 27, 64],
-        quick_sizes: 3,
-        scene: |organs| scene_text(organs, 2_000, 600, "0"),
-        contenders: |_| all(),
-        measure: f64::from,
-        threads: None,
-        is_fitted: true,
-    },
-    Plan {
-        name: "threads",
-        setup: "27 ellipsoids of 5 000 faces, one view of 1024×1024",
-        sizes: &[1, 2, 4, 8, 16, 32, 64],
-        quick_sizes: 2,
-        scene: |_| scene_text(27, 5_000, 1_024, "0"),
-        contenders: |_| all(),
-        measure: f64::from,
-        threads: Some(|threads| threads as usize),
-        is_fitted: true,
-    },
-    Plan {
-        name: "cache, kB",
-        setup: "one ellipsoid of 2 000 faces in a tree, one view of 256×256",
-        sizes: &[125, 250, 500, 1_000, 2_000, 4_000, 8_000],
-        quick_sizes: 7,
-        scene: |_| scene_text(1, 2_000, 256, "0"),
-        contenders: |kilobytes| vec![with_cache(Contender::paper(0.05), kilobytes)],
-        measure: f64::from,
-        threads: None,
-        is_fitted: false,
-    },
-];
-
-fn all() -> Vec<Contender> {
-    let engines = [None, Some(Engine::Raster), Some(Engine::Walk), Some(Engine::Bvh)];
-    let trees = [Contender::tolerance(0.5), Contender::paper(0.05)];
-    engines.into_iter().map(Contender::exact).chain(trees).collect()
-}
-
-fn with_cache(contender: Contender, kilobytes: u32) -> Contender {
-    let Method::RiTree(settings) = contender.method else { return contender };
-    let cache_bytes = 1_000 * kilobytes as usize;
-    let dial = Dial { option: "cache-mb", value: f64::from(kilobytes) / 1e3 };
-    Contender {
-        method: Method::RiTree(crate::modes::project::TreeSettings { cache_bytes, ..settings }),
-        dial: Some(dial),
-    }
-}
-
-/// So many ellipsoids on a cubic grid that fills the view, which looks at it from `gantry` angles.
-fn scene_text(organs: u32, faces: u32, side: u32, gantry: &str) -> String {
-    let mut text = format!(
-        "name = \"scale\"\n[beam]\ngantry_deg = \"{gantry}\"\nsad_mm = 1000\nsdd_mm = 1500\n\
-         detector = {{ size_mm = [360, 360], pixels = [{side}, {side}] }}\n[spectrum]\nenergy_keV = 60\n"
-    );
-    let per_side = f64::from(organs).cbrt().round().max(1.0) as u32;
-    let pitch = 200.0 / f64::from(per_side);
-    for i in 0..organs {
-        let place = [i % per_side, i / per_side % per_side, i / (per_side * per_side)];
-        let [x, y, z] = place.map(|p| pitch * (f64::from(p) + 0.5) - 100.0);
-        let [a, b, c] = [0.49, 0.39, 0.29].map(|share| share * pitch);
-        text += &format!(
-            "[[organ]]\nname = \"organ {i}\"\nmaterial = \"water\"\ndensity_g_cm3 = 1\n\
-             shape = {{ kind = \"ellipsoid\", half_axes_mm = [{a}, {b}, {c}], centre_mm = [{x}, {y}, {z}], faces = {faces} }}\n"
-        );
-    }
-    text
-}
-
 /// How many turns [`scale`] takes at most, for its progress.
 pub fn turns(settings: &ScaleSettings) -> u64 {
     let turns = |plan: &Plan| {
@@ -235,6 +124,9 @@ pub fn turns(settings: &ScaleSettings) -> u64 {
 }
 
 fn sizes(plan: &Plan, settings: &ScaleSettings) -> Vec<u32> {
+    if !settings.studies.is_empty() && !settings.studies.iter().any(|name| name == plan.short_name()) {
+        return Vec::new();
+    }
     let count = if settings.quick { plan.quick_sizes } else { plan.sizes.len() };
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let is_there = |&&size: &&u32| plan.threads.is_none_or(|threads| threads(size) <= cores);
@@ -284,18 +176,20 @@ fn measure(plan: &Plan, settings: &ScaleSettings, control: &Control, study: &mut
         let scene_bytes = held_bytes().zip(held).and_then(|(now, before)| now.checked_sub(before));
         let views: Vec<View> = scene.beam.views()?;
         let contenders = (plan.contenders)(size);
-        let mut bytes = vec![0; contenders.len()];
+        let mut trees = vec![(0, 0); contenders.len()];
         let pool = plan.threads.map(|threads| pool(threads(size))).transpose()?;
         let results = race(contenders.len(), settings.patience, control, |i| {
             let mut once = || run(&mut scene, contenders[i].method, &views, control);
-            let Run { cold, warm, tree_bytes } = match &pool {
+            let Run { cold, warm, tree_bytes, cells } = match &pool {
                 Some(pool) => pool.install(once),
                 None => once(),
             }?;
-            bytes[i] = tree_bytes;
+            trees[i] = (tree_bytes, cells);
             Ok([cold, warm])
         })?;
-        for ((contender, [cold, warm]), tree_bytes) in contenders.iter().zip(&results.times).zip(bytes) {
+        for ((contender, [cold, warm]), (tree_bytes, tree_cells)) in
+            contenders.iter().zip(&results.times).zip(trees)
+        {
             if !cold.0.is_empty() {
                 study.rows.push(ScaleRow {
                     size: (plan.measure)(size),
@@ -305,6 +199,7 @@ fn measure(plan: &Plan, settings: &ScaleSettings, control: &Control, study: &mut
                     load_s,
                     scene_bytes,
                     tree_bytes,
+                    tree_cells,
                 });
             }
         }
@@ -320,14 +215,19 @@ fn pool(threads: usize) -> Result<rayon::ThreadPool> {
     built.map_err(|e| Error::input(format!("{threads} threads"), e.to_string(), "close other programs"))
 }
 
-/// A fit for each method that was measured at two sizes or more.
-fn fits(rows: &[ScaleRow], available_bytes: Option<u64>) -> Vec<Fit> {
-    let mut options: Vec<&str> = Vec::new();
+/// The options of the methods that were measured, each once, in the order of their first rows.
+pub fn methods(rows: &[ScaleRow]) -> Vec<&str> {
+    let mut methods: Vec<&str> = Vec::new();
     for row in rows {
-        if !options.contains(&row.options.as_str()) {
-            options.push(&row.options);
+        if !methods.contains(&row.options.as_str()) {
+            methods.push(&row.options);
         }
     }
+    methods
+}
+
+/// A fit for each method that was measured at two sizes or more.
+fn fits(rows: &[ScaleRow], available_bytes: Option<u64>) -> Vec<Fit> {
     let fit = |options: &str| {
         let own: Vec<&ScaleRow> = rows.iter().filter(|row| row.options == options).collect();
         let points =
@@ -349,7 +249,7 @@ fn fits(rows: &[ScaleRow], available_bytes: Option<u64>) -> Vec<Fit> {
             size_at_full_memory: bytes_each.zip(available_bytes).map(|(each, all)| all as f64 / each),
         })
     };
-    options.into_iter().filter_map(fit).collect()
+    methods(rows).into_iter().filter_map(fit).collect()
 }
 
 /// The slope of the straight line through the logarithms of points, by least squares. `None` of fewer than two sizes.
@@ -380,6 +280,7 @@ mod tests {
             load_s: 1.0,
             scene_bytes: Some((size * 1e7) as u64),
             tree_bytes: 0,
+            tree_cells: 0,
         }
     }
 

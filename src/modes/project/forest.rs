@@ -11,9 +11,7 @@ use crate::exact::{Body, Spans};
 use crate::geometry::{Interval, RayGrid, Region, Segment};
 use crate::linespace::LineSpace;
 use crate::modes::project::Found;
-use crate::ritree::{
-    Answer, BuildCounts, Cache, FittedTree, Parameters, Reason, RiTree, TreeShape, oldest_to_keep,
-};
+use crate::ritree::{Answer, BuildCounts, Cache, Descent, FittedTree, Parameters, Reason, RiTree, TreeShape};
 
 /// How lengths between samples are found.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -175,6 +173,21 @@ pub struct Forest<'a> {
     clock: AtomicU32,
 }
 
+/// The tree of one organ, asked for one ray after another.
+pub enum OrganDescent<'t, 'a> {
+    Quadrilinear(Descent<'t, ChordLength<'a>>),
+    SquaredChord(&'t FittedTree<SquaredChord<'a>>),
+}
+
+impl<'a> OrganTree<'a> {
+    pub fn descent(&self) -> OrganDescent<'_, 'a> {
+        match self {
+            Self::Quadrilinear(tree) => OrganDescent::Quadrilinear(tree.descent()),
+            Self::SquaredChord(tree) => OrganDescent::SquaredChord(tree),
+        }
+    }
+}
+
 /// Many trees to ask, none of them pruned meanwhile.
 pub struct Grove<'f, 'a> {
     trees: RwLockReadGuard<'f, Vec<OnceLock<OrganTree<'a>>>>,
@@ -239,22 +252,15 @@ impl<'a> Forest<'a> {
 
     /// Forgets the least recently used leaves if the cache was full.
     pub fn prune_if_full(&self) {
-        if !self.cache.is_full() {
-            return;
-        }
-        let mut trees = self.trees.write().unwrap_or_else(PoisonError::into_inner);
-        if !self.cache.is_full() {
-            // Another thread was first.
-            return;
-        }
-        let mut stamps = Vec::new();
-        let all = trees.iter().filter_map(OnceLock::get);
-        all.for_each(|tree| either!(tree, tree => tree.collect_stamps(&mut stamps)));
-        let kept_bytes = (self.settings.kept_share * self.cache.limit_bytes() as f64) as usize;
-        let oldest = oldest_to_keep(stamps, kept_bytes);
-        let all = trees.iter_mut().filter_map(OnceLock::get_mut);
-        all.for_each(|tree| either!(tree, tree => tree.prune(oldest, &self.cache)));
-        self.cache.relieved();
+        let share = self.settings.kept_share;
+        let collect = |trees: &Vec<OnceLock<OrganTree>>, stamps: &mut Vec<_>| {
+            let all = trees.iter().filter_map(OnceLock::get);
+            all.for_each(|tree| either!(tree, tree => tree.collect_stamps(stamps)));
+        };
+        self.cache.prune_if_full(&self.trees, share, collect, |trees, oldest| {
+            let all = trees.iter_mut().filter_map(OnceLock::get_mut);
+            all.for_each(|tree| either!(tree, tree => tree.prune(oldest, &self.cache)));
+        });
     }
 
     pub fn report(&self) -> ForestReport {
@@ -303,19 +309,19 @@ impl<'a> Grove<'_, 'a> {
 
     /// The chord of a segment that holds the body's box whole, as the tree of that body knows it. `Err` says why it is
     /// to be traced; `Ok(None)` that it misses. Where a chord lies is known only in a forest that wants places.
-    pub fn chord(&self, tree: &OrganTree, segment: &Segment) -> Result<Option<Interval>, Reason> {
+    pub fn chord(&self, tree: &mut OrganDescent, segment: &Segment) -> Result<Option<Interval>, Reason> {
         let line = segment.line();
         match tree {
-            OrganTree::Quadrilinear(tree) => {
-                let attribute = tree.attribute();
+            OrganDescent::Quadrilinear(descent) => {
+                let attribute = descent.tree().attribute();
                 let point = attribute.space().point_of(line);
-                match tree.query(point, &self.forest.cache) {
+                match descent.query(point, &self.forest.cache) {
                     None | Some(Answer::Interpolated(None)) => Ok(None),
                     Some(Answer::Interpolated(Some(chord))) => Ok(attribute.stretch(chord, line, point)),
                     Some(Answer::Trace(reason)) => Err(reason),
                 }
             }
-            OrganTree::SquaredChord(tree) => {
+            OrganDescent::SquaredChord(tree) => {
                 let chords = tree.fit();
                 let Some((pair, stuv)) = chords.place_of(line) else { return Ok(None) };
                 let chord = |leaf: &_, _| chords.chord(leaf, line, pair, &stuv);
@@ -325,8 +331,8 @@ impl<'a> Grove<'_, 'a> {
     }
 
     /// As [`chord`](Self::chord), its length alone, mm.
-    pub fn length_mm(&self, tree: &OrganTree, segment: &Segment) -> Result<f64, Reason> {
-        let OrganTree::SquaredChord(tree) = tree else {
+    pub fn length_mm(&self, tree: &mut OrganDescent, segment: &Segment) -> Result<f64, Reason> {
+        let OrganDescent::SquaredChord(tree) = tree else {
             return self.chord(tree, segment).map(|chord| chord.map_or(0.0, |chord| chord.length()));
         };
         let (line, chords) = (segment.line(), tree.fit());
@@ -368,8 +374,10 @@ impl<'a> Grove<'_, 'a> {
         let bounds = body.bounds();
         match tree {
             OrganTree::Quadrilinear(_) => {
+                let mut descent = tree.descent();
                 for (i, ray) in rays.iter().enumerate() {
-                    let chord = if holds_box(ray, &bounds) { self.chord(tree, ray).ok() } else { None };
+                    let chord =
+                        if holds_box(ray, &bounds) { self.chord(&mut descent, ray).ok() } else { None };
                     answer_or_keep(i, chord);
                 }
             }
@@ -413,32 +421,4 @@ pub fn holds_box(segment: &Segment, bounds: &crate::geometry::Bounds) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
-    use glam::DVec3;
-
-    use super::*;
-    use crate::geometry::primitives::icosphere;
-    use crate::geometry::{ClosedMesh, Line, UnitDir};
-
-    #[test]
-    fn trees_share_one_clock_so_that_the_one_asked_last_is_the_newest() {
-        let ball = || Body::new(ClosedMesh::new(icosphere(2)).expect("closed").0);
-        let (often, once) = (ball(), ball());
-        let parameters = Parameters::default();
-        let interpolation = Interpolation::Quadrilinear { parameters };
-        let settings = TreeSettings { interpolation, ..TreeSettings::default() };
-        let forest = Forest::new(vec![&often, &once], settings, false);
-        let line = Line::new(DVec3::ZERO, UnitDir::new(DVec3::new(1.0, 0.2, 0.1)).expect("a direction"));
-        let line = line.expect("finite");
-        let newest = |organ: usize| {
-            let grove = forest.enter();
-            let Some(OrganTree::Quadrilinear(tree)) = grove.tree(organ) else { panic!("no tree") };
-            let _ = tree.query(tree.attribute().space().point_of(&line), &forest.cache);
-            let mut stamps = Vec::new();
-            tree.collect_stamps(&mut stamps);
-            stamps.iter().map(|s| s.0).max().expect("leaves")
-        };
-        let old = (0..50).map(|_| newest(0)).max().expect("asked");
-        assert!(newest(1) > old);
-    }
-}
+mod tests;

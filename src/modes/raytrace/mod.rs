@@ -25,7 +25,7 @@ use super::Control;
 use super::project::tiles;
 use crate::error::Result;
 use crate::geometry::{Ray, Real, Region, Vec3};
-use crate::ritree::{BuildCounts, Cache, Parameters, oldest_to_keep};
+use crate::ritree::{BuildCounts, Cache, Parameters};
 use crate::scene::trace::{Camera, World};
 use crate::surface::optics::{reflectance, reflected};
 use crate::surface::{Reach, Slabs};
@@ -182,19 +182,12 @@ impl<'a, R: Real> Renderer<'a, R> {
 
     /// Forgets the least recently used leaves if the cache was full.
     fn prune_if_full(&self) {
-        if !self.cache.is_full() {
-            return;
-        }
-        let mut seers = self.seers.write().unwrap_or_else(PoisonError::into_inner);
-        if !self.cache.is_full() {
-            // Another thread was first.
-            return;
-        }
-        let mut stamps = Vec::new();
-        seers.iter().for_each(|seer| seer.collect_stamps(&mut stamps));
-        let oldest = oldest_to_keep(stamps, (self.kept_share * self.cache.limit_bytes() as f64) as usize);
-        seers.iter_mut().for_each(|seer| seer.prune(oldest, &self.cache));
-        self.cache.relieved();
+        let collect = |seers: &Vec<Seer<R>>, stamps: &mut Vec<_>| {
+            seers.iter().for_each(|seer| seer.collect_stamps(stamps));
+        };
+        self.cache.prune_if_full(&self.seers, self.kept_share, collect, |seers, oldest| {
+            seers.iter_mut().for_each(|seer| seer.prune(oldest, &self.cache));
+        });
     }
 }
 

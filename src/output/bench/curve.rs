@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{Named, machine, seconds};
+use super::{COLD_AND_WARM, Named, TIMES, machine, seconds, times};
 use crate::modes::bench::curve::{CurveReport, CurveRow};
 use crate::modes::bench::{EXACT_BELOW_MM, Times};
 use crate::output::page::curves::{Axis, COLOURS, Curve, Curves, Point, Spacing};
@@ -104,7 +104,12 @@ fn page(report: &CurveReport) -> String {
     document(
         &format!("Error against time: {}", report.scene),
         &[
-            ("", recommendation + &machine(&report.machine, &report.command, report.complete) + &what),
+            (
+                "",
+                recommendation
+                    + &machine(&report.machine, &report.command, report.complete, COLD_AND_WARM)
+                    + &what,
+            ),
             ("Curves", plots),
             ("Figures", rows(report)),
             ("Left out", left_out),
@@ -162,26 +167,20 @@ fn errors(row: &CurveRow) -> [String; 3] {
 }
 
 fn csv(report: &CurveReport) -> String {
-    let mut text = String::from(
-        "columns,rows,method,setting,value,cold_s,cold_least_s,cold_most_s,warm_s,warm_least_s,warm_most_s,rounds,\
-         mean_error_mm,p99_9_error_mm,max_error_mm,exact,tree_bytes,on_cold_front,on_warm_front\n",
+    let mut text = format!(
+        "columns,rows,method,setting,value,{TIMES},mean_error_mm,p99_9_error_mm,max_error_mm,exact,tree_bytes,on_cold_front,\
+         on_warm_front\n",
     );
     for row in &report.rows {
         let (setting, value) =
             row.setting.map_or((String::new(), String::new()), |d| (d.option.into(), d.value.to_string()));
         let _ = writeln!(
             text,
-            "{},{},{},{setting},{value},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+            "{},{},{},{setting},{value},{},{},{},{},{},{},{},{}",
             row.pixels[0],
             row.pixels[1],
             row.method,
-            row.cold.seconds,
-            row.cold.least,
-            row.cold.most,
-            row.warm.seconds,
-            row.warm.least,
-            row.warm.most,
-            row.cold.rounds,
+            times(&row.cold, &row.warm),
             row.error_mm.mean,
             row.error_mm.p999,
             row.error_mm.max,
