@@ -68,19 +68,7 @@ impl<'s> Shaft<'s> {
 
     /// Whether no line of the cell meets the body, proved by one plane that has all of it behind.
     pub fn misses_all(&self) -> bool {
-        self.planes.iter().any(|&(n, least)| {
-            let is_met = std::cell::Cell::new(false);
-            let reaches = |p: DVec3| n.dot(p - self.origin) >= least;
-            self.surface.tree().visit(
-                |b| !is_met.get() && reaches(DVec3::select(n.cmpge(DVec3::ZERO), b.max, b.min)),
-                |f| {
-                    is_met.set(
-                        is_met.get() || self.surface.mesh().triangle(f as usize).into_iter().any(reaches),
-                    )
-                },
-            );
-            !is_met.get()
-        })
+        self.planes.iter().any(|&(n, least)| !self.surface.reaches_above(n, self.origin, least))
     }
 
     /// Whether a plane parts the shaft from the hull of some points.
