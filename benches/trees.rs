@@ -327,16 +327,29 @@ fn random_rays(out: &mut impl Write, body: &Body, count: usize, tolerances_mm: &
         let mut traced = 0;
         let mut find = || {
             traced = 0;
+            let (mut open, mut open_rays, mut lengths_of_open) = (Vec::new(), Vec::new(), Vec::new());
             for (rays, lengths) in rays.chunks(4096).zip(lengths.chunks_mut(4096)) {
-                traced += find_by(rays.iter().copied(), body, lengths, |ray| {
-                    let (line, chords) = (ray.line(), tree.fit());
-                    let Some((pair, stuv)) = chords.place_of(line) else { return Some(0.0) };
-                    match tree.ask(pair, &stuv, &cache, |leaf, _| chords.known(leaf, line, pair, &stuv)) {
-                        Known::Miss => Some(0.0),
-                        Known::Length(length) => Some(length),
-                        Known::Nothing => None,
+                open.clear();
+                open_rays.clear();
+                let lines = rays.iter().map(Segment::line).enumerate();
+                SquaredChord::ask_all(&tree, lines, &cache, |i, line, asked| {
+                    let known = asked.map_or(Known::Miss, |(leaf, pair, stuv)| {
+                        tree.fit().known(leaf, line, pair, stuv)
+                    });
+                    match known {
+                        Known::Miss => lengths[i] = 0.0,
+                        Known::Length(length) => lengths[i] = length,
+                        Known::Nothing => {
+                            open.push(i);
+                            open_rays.push(rays[i]);
+                        }
                     }
                 });
+                traced += open.len();
+                lengths_of_open.clear();
+                lengths_of_open.resize(open.len(), 0.0);
+                body.trace(Engine::Walk, 0, &open_rays, &mut Lengths(&mut lengths_of_open));
+                open.iter().zip(&lengths_of_open).for_each(|(&i, &length)| lengths[i] = length);
             }
         };
         let (cold_s, warm_s) = (seconds(&mut find), seconds(&mut find));

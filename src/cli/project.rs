@@ -308,6 +308,7 @@ pub fn method_named(name: MethodArg, args: &MethodArgs) -> Result<Method> {
         cache_bytes,
         kept_share,
         least_planes: args.tree_planes.unwrap_or(least_planes),
+        general_bodies: name == MethodArg::Ritree,
     };
     Ok(match name {
         MethodArg::Exact => Method::Exact(None),

@@ -32,6 +32,7 @@ pub struct ConvexMesh {
     /// By face; a face without area has none.
     plane_of_face: Vec<Option<u32>>,
     reflex_depth_mm: f64,
+    is_strict: bool,
 }
 
 /// Why a closed surface is not convex. Not an error: such a body is traced by other means.
@@ -87,7 +88,7 @@ impl ConvexMesh {
         if planes.len() == plane_of_face.len() && is_strictly_convex(&surface) {
             // No vertex stands out of an exact plane, so only the rounding of normals and heights is left.
             let reflex_depth_mm = arithmetic_mm(surface.bounds());
-            return Ok(Self { surface, planes, plane_of_face, reflex_depth_mm });
+            return Ok(Self { surface, planes, plane_of_face, reflex_depth_mm, is_strict: true });
         }
         let tolerance_mm = surface.rounding_tolerance_mm();
         let (depth_mm, place) = planes.iter().fold((0.0, DVec3::ZERO), |worst, plane| {
@@ -96,7 +97,7 @@ impl ConvexMesh {
         if depth_mm > tolerance_mm {
             return Err(Box::new((surface, NotConvex::Reflex { depth_mm, tolerance_mm, place })));
         }
-        Ok(Self { surface, planes, plane_of_face, reflex_depth_mm: depth_mm })
+        Ok(Self { surface, planes, plane_of_face, reflex_depth_mm: depth_mm, is_strict: false })
     }
 
     /// The surface.
@@ -117,6 +118,11 @@ impl ConvexMesh {
     /// How far the worst vertex stands out of a face's plane, mm: no more than rounding explains.
     pub fn reflex_depth_mm(&self) -> f64 {
         self.reflex_depth_mm
+    }
+
+    /// Whether it is convex at each edge by exact signs, and no two faces at an edge lie in one plane.
+    pub fn is_strict(&self) -> bool {
+        self.is_strict
     }
 
     /// The box around it, mm.

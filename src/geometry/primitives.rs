@@ -59,6 +59,20 @@ pub fn prism(sides: u32) -> TriMesh {
     TriMesh { vertices: ring(-1.0).chain(ring(1.0)).collect(), faces: ends.chain(walls).collect() }
 }
 
+/// A torus about the z axis, `n` × `n` quads cut in two: a tube of radius `tube` whose middle runs at `radius`.
+pub fn torus(radius: f64, tube: f64, n: u32) -> TriMesh {
+    let angle = |i: u32| std::f64::consts::TAU * f64::from(i) / f64::from(n);
+    let vertex = |i: u32, j: u32| {
+        let ((s, c), (t, d)) = (angle(i).sin_cos(), angle(j).sin_cos());
+        DVec3::new((radius + tube * d) * c, (radius + tube * d) * s, tube * t)
+    };
+    let vertices = (0..n * n).map(|k| vertex(k / n, k % n)).collect();
+    let at = |i: u32, j: u32| i % n * n + j % n;
+    let quad = |i, j| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+    let quads = (0..n * n).map(|k| quad(k / n, k % n));
+    TriMesh { vertices, faces: quads.flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect() }
+}
+
 /// The faces of the icosahedron whose vertices `icosphere` lists.
 #[rustfmt::skip]
 const ICOSAHEDRON: [[u32; 3]; 20] = [

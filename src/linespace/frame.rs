@@ -80,6 +80,11 @@ impl LineFrame {
         [s, t, s + slope_i, t + slope_j]
     }
 
+    /// The vector whose product with a way in the frame is that of `normal` with the way in the world, mm.
+    pub fn normal_in_frame(&self, normal: DVec3) -> DVec3 {
+        self.from_unit.matrix3.transpose() * normal
+    }
+
     /// The places of a line's two intercepts, mm.
     pub fn ends(&self, axis: usize, [s, t, u, v]: [f64; 4]) -> [DVec3; 2] {
         let place = |plane: f64, across: [f64; 2]| {

@@ -41,6 +41,11 @@ impl PixelForm {
         }
     }
 
+    /// `self + value`, the same for all pixels.
+    pub fn plus_constant(self, value: f64) -> Self {
+        Self { at_origin: self.at_origin + value, ..self }
+    }
+
     fn scaled(self, factor: f64) -> Self {
         Self::default().plus(factor, self)
     }

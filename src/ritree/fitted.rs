@@ -149,6 +149,44 @@ impl<F: Fit> FittedTree<F> {
         }
     }
 
+    /// As [`ask`](Self::ask), for some lines at a time: level by level, so that their ways to memory overlap.
+    pub fn ask_all(
+        &self,
+        lines: &[(PlanePair, [f64; 4])],
+        cache: &Cache,
+        mut ask: impl FnMut(usize, &F::Leaf),
+    ) {
+        let steps: Vec<_> = lines.iter().map(|(_, stuv)| steps_of(stuv)).collect();
+        let mut nodes: Vec<_> = lines.iter().map(|(pair, _)| &self.roots[pair.index() / 2]).collect();
+        for level in 0..STEP_BITS {
+            let mut is_split = false;
+            for (node, steps) in nodes.iter_mut().zip(&steps) {
+                if let Some(State::Split(parts)) = node.state.get() {
+                    *node = &parts[part_of(steps, level)];
+                    is_split = true;
+                }
+            }
+            if !is_split {
+                break;
+            }
+        }
+        for node in &nodes {
+            if let Some(State::Final(stamped)) = node.state.get() {
+                // Read now, while none waits for it.
+                std::hint::black_box(stamped.stamp.load(Ordering::Relaxed));
+            }
+        }
+        for (i, ((pair, stuv), node)) in lines.iter().zip(nodes).enumerate() {
+            match node.state.get() {
+                Some(State::Final(stamped)) => {
+                    self.touch(stamped);
+                    ask(i, &stamped.leaf);
+                }
+                _ => self.ask(*pair, stuv, cache, |leaf, _| ask(i, leaf)),
+            }
+        }
+    }
+
     /// The same answer, by fits that are not kept.
     fn ask_without_keeping<R>(
         &self,

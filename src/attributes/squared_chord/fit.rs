@@ -1,6 +1,7 @@
 //! What becomes of a cell: a pure function of it.
 
-use super::cubic::{Cubic, Design, FIT_LINES, MORE_LINES, TEST_LINES};
+use super::cubic::{Cubic, Design, FIT_LINES, TEST_LINES};
+use super::planes::{FewPlanes, MOST_PLANES};
 use super::samples::{Hit, Samples};
 use super::shaft::{Shaft, Sheets};
 use super::{ChordLeaf, ChordModel, SquaredChord};
@@ -23,6 +24,25 @@ const MOST_SPLITS: u32 = 1;
 /// A cell is split if that would spare this share of its hits to be traced.
 const WORTH_SPLITTING: f64 = 0.15;
 
+/// The costs of an answer in planes clipped by: of a model, and of a line traced. A plane takes 1 ns of a run's pixel and 2 ns of
+/// a line on its own, a walk takes 60 to 100 ns from pixel to pixel and 200 ns elsewhere.
+mod cost {
+    pub const MODEL: f64 = 2.0;
+    pub const TRACED: f64 = 60.0;
+}
+
+/// Cells of so few planes are not looked at any closer.
+const FEW_PLANES: usize = 8;
+
+/// Lines looked for that meet the body in a cell of few planes.
+const LINES_OF_FEW: usize = 16;
+
+/// Bodies of more planes have no cell of few but along creases, and are asked only there.
+const PLANES_OF_COARSE: usize = 5_000;
+
+/// Where lines miss, so many more are taken at a time, until as many hit as a fit takes.
+const MORE_AT_A_TIME: usize = 32;
+
 /// The largest error that samples show, times this, is taken for the bound of all.
 const SAFETY: f64 = 1.75;
 
@@ -43,13 +63,14 @@ impl<'a> SquaredChord<'a> {
         /// Lines through the body, somewhat off its middle.
         const PROBES: [[f64; 4]; 3] =
             [[0.3, 0.4, 0.35, 0.6], [0.63, 0.52, 0.44, 0.71], [0.4, 0.7, 0.69, 0.46]];
-        let look = |axis: usize, level: u32| {
+        let place = |axis: usize, level: u32| {
             let parts = 0..4 * level;
             let root = Place::root(LineFrame::pair(axis));
-            self.look_at(&parts.fold(root, |place, _| place.half(place.side_of::<f64>(&PROBES[axis]))))
+            parts.fold(root, |place, _| place.half(place.side_of::<f64>(&PROBES[axis])))
         };
+        let look = |axis: usize, level: u32| self.look_at(&place(axis, level));
         if !self.is_convex() {
-            let fits = (0..3).filter_map(|axis| look(axis, DEEPEST_OF_GENERAL)?.fit);
+            let fits = (0..3).filter_map(|axis| look(axis, DEEPEST_OF_GENERAL).ok()?.fit);
             self.noise = fits.map(|fit| fit.error).reduce(f64::min).unwrap_or(0.0);
             (self.first_level, self.deepest_level) = (LEVELS.start, DEEPEST_OF_GENERAL);
             return self;
@@ -57,16 +78,20 @@ impl<'a> SquaredChord<'a> {
         let mut noise = f64::INFINITY;
         // F is spread evenly over lines through a ball, from 0 to about 1 there.
         let mut traced = |level: u32| -> f64 {
-            let fits = (0..3).map(|axis| look(axis, level).and_then(|look| look.fit));
-            let shares = fits.map(|fit| {
-                let fit = fit?;
+            let fits = (0..3).map(|axis| look(axis, level).ok().and_then(|look| look.fit));
+            let shares = fits.enumerate().map(|(axis, fit)| {
+                let clipped = self
+                    .planes_of_coarse(&place(axis, level))
+                    .map_or(1.0, |few| few.planes.len() as f64 / cost::TRACED);
+                let Some(fit) = fit else { return clipped };
                 noise = noise.min(fit.error);
-                Some(fit.threshold.min(1.0))
+                fit.threshold.min(clipped)
             });
-            shares.map(|share| share.unwrap_or(1.0)).sum::<f64>() / 3.0
+            shares.sum::<f64>() / 3.0
         };
         let (mut level, mut here) = (LEVELS.start, traced(LEVELS.start));
-        while level + 1 < LEVELS.end {
+        // No level gains more than there is to be traced.
+        while level + 1 < LEVELS.end && here >= WORTH_A_LEVEL {
             let next = traced(level + 1);
             if here - next < WORTH_A_LEVEL && here < 0.5 {
                 break;
@@ -82,24 +107,43 @@ impl<'a> SquaredChord<'a> {
         self
     }
 
+    fn shaft(&self, place: &Place) -> Shaft<'a> {
+        Shaft::new(&self.frame, place, self.body.surface())
+    }
+
+    /// The planes that a cell's lines may meet, if they are few and the body has not so many that it is not worth a look.
+    fn planes_of_coarse(&self, place: &Place) -> Option<FewPlanes> {
+        let convex = self.body.convexity().ok()?;
+        let is_coarse = convex.planes().len() <= PLANES_OF_COARSE;
+        if is_coarse { self.few_planes(&self.shaft(place)) } else { None }
+    }
+
     /// |d in mm| / |d|² of a line: from √F to its length.
     fn length_factor(&self, axis: usize, stuv: [f64; 4]) -> f64 {
         let [start, end] = self.frame.ends(axis, stuv);
         end.distance(start) / squared_span(&stuv)
     }
 
-    /// Samples a cell and fits it. `None` if all lines miss.
-    fn look_at(&self, place: &Place) -> Option<Look> {
+    /// Samples a cell and fits it.
+    fn look_at(&self, place: &Place) -> Result<Look, Missed> {
         let design = Design::get();
         let mut samples = Samples::new(self, place);
         samples.take(&design.places[..FIT_LINES]);
         let is_complete = samples.hits.len() == FIT_LINES;
-        if !is_complete {
-            samples.take(&design.places[FIT_LINES..]);
+        let missed = |samples: &Samples, is_empty| Missed { samples: samples.count as u64, is_empty };
+        if samples.hits.is_empty() && self.shaft(place).misses_all() {
+            return Err(missed(&samples, true));
+        }
+        for more in design.places[FIT_LINES..].chunks(MORE_AT_A_TIME) {
+            if samples.hits.len() < FIT_LINES {
+                samples.take(more);
+            }
         }
         samples.take(&design.tests);
-        (!samples.hits.is_empty())
-            .then(|| Look { fit: self.fit_of(place, &samples, is_complete), samples: samples.count as u64 })
+        if samples.hits.is_empty() {
+            return Err(missed(&samples, false));
+        }
+        Ok(Look { fit: self.fit_of(place, &samples, is_complete), samples: samples.count as u64 })
     }
 
     /// Whether all samples of a cell go through a body that is not convex equally often, as they do but for rounding; and
@@ -145,15 +189,15 @@ impl<'a> SquaredChord<'a> {
         };
         let after_split = threshold(error.min((error / GAIN_OF_SPLIT).max(self.noise)));
         let threshold = threshold(error);
-        let gain_of_split = traced(threshold) - traced(after_split);
-        let mut fit = CellFit { cubic, middle: None, error, threshold, gain_of_split };
+        let (traced, traced_after_split) = (traced(threshold), traced(after_split));
+        let mut fit = CellFit { cubic, middle: None, error, threshold, traced, traced_after_split };
         if self.wants_places {
             let middle = cubic_of(|hit| hit.middle)?;
             let known = samples.hits.iter().filter(|hit| hit.f >= threshold);
             let off = known.map(|hit| (middle.at(local(hit.line)) - hit.middle).abs()).fold(0.0, f64::max);
             if SAFETY * off * factor > self.tolerance_mm {
                 // No chord is known whose place is not.
-                (fit.threshold, fit.gain_of_split) = (f64::INFINITY, 1.0);
+                (fit.threshold, fit.traced, fit.traced_after_split) = (f64::INFINITY, 1.0, 0.0);
             }
             fit.middle = Some(Box::new(middle));
         }
@@ -162,7 +206,7 @@ impl<'a> SquaredChord<'a> {
 
     /// What becomes of a cell of a body that is not convex: `None` if it is to be sampled.
     fn without_samples(&self, place: &Place) -> Option<Fitted<ChordLeaf>> {
-        let leaf = match Shaft::new(&self.frame, place, self.body.surface()).sheets() {
+        let leaf = match self.shaft(place).sheets() {
             Sheets::Constant => return None,
             Sheets::None => Some(ChordLeaf::Empty),
             Sheets::Unknown if place.depth / 4 < self.deepest_level => None,
@@ -188,19 +232,46 @@ impl Fit for SquaredChord<'_> {
         {
             return known;
         }
-        let all = (FIT_LINES + MORE_LINES + TEST_LINES) as u64;
-        let Some(look) = self.look_at(place) else {
-            let shaft = Shaft::new(&self.frame, place, self.body.surface());
-            let leaf = if shaft.misses_all() { ChordLeaf::Empty } else { ChordLeaf::Traced };
-            return Fitted { samples: all, leaf: Some(leaf) };
+        let mut few = self.planes_of_coarse(place);
+        if let Some(few) = few.as_mut().filter(|few| few.planes.len() <= FEW_PLANES) {
+            let mut samples = Samples::new(self, place);
+            if !few.is_met && !few.planes.is_empty() {
+                samples.take(&Design::get().places[..LINES_OF_FEW]);
+                few.is_met = !samples.hits.is_empty();
+            }
+            if few.is_met || few.planes.is_empty() {
+                return Fitted { samples: samples.count as u64, leaf: Some(few.leaf()) };
+            }
+        }
+        let look = match self.look_at(place) {
+            Ok(look) => look,
+            Err(Missed { samples, is_empty }) => {
+                let leaf = match few {
+                    _ if is_empty => ChordLeaf::Empty,
+                    Some(few) if few.is_met || few.planes.is_empty() => few.leaf(),
+                    _ => ChordLeaf::Traced,
+                };
+                return Fitted { samples, leaf: Some(leaf) };
+            }
         };
+        let (traced, after_split) =
+            look.fit.as_ref().map_or((1.0, 1.0), |fit| (fit.traced, fit.traced_after_split));
+        if few.is_none() && traced > WORTH_SPLITTING {
+            few = self.few_planes(&self.shaft(place));
+        }
+        let by_planes = few.as_ref().map_or(f64::INFINITY, |few| few.planes.len() as f64);
+        let by_model = |traced: f64| cost::MODEL + cost::TRACED * traced;
+        // A split halves what a cell sees.
+        let gain = by_planes.min(by_model(traced)) - (0.5 * by_planes).min(by_model(after_split));
         let is_deepest = place.depth / 4 >= self.deepest_level;
-        let leaf = match look.fit {
+        let leaf = match (look.fit, few) {
+            (Some(_), _) if gain > cost::TRACED * WORTH_SPLITTING && !is_deepest => None,
+            // Some sample hit.
+            (_, Some(few)) if by_planes < by_model(traced) => Some(few.leaf()),
             // Few lines hit, and they are traced.
-            None => Some(ChordLeaf::Traced),
-            Some(fit) if fit.gain_of_split > WORTH_SPLITTING && !is_deepest => None,
-            Some(fit) if !fit.threshold.is_finite() => Some(ChordLeaf::Traced),
-            Some(fit) => Some(ChordLeaf::Model(ChordModel {
+            (None, _) => Some(ChordLeaf::Traced),
+            (Some(fit), _) if !fit.threshold.is_finite() => Some(ChordLeaf::Traced),
+            (Some(fit), _) => Some(ChordLeaf::Model(ChordModel {
                 centre: place.cell.centre(),
                 scale: 2.0 / (place.cell.high[0] - place.cell.low[0]),
                 cubic: fit.cubic,
@@ -214,22 +285,40 @@ impl Fit for SquaredChord<'_> {
     fn bytes_beside(&self, leaf: &ChordLeaf) -> usize {
         match leaf {
             ChordLeaf::Model(ChordModel { middle: Some(_), .. }) => size_of::<Cubic>(),
+            ChordLeaf::Planes(few) => size_of_val(&**few),
             _ => 0,
         }
     }
 
     fn most_bytes_beside(&self) -> usize {
-        if self.wants_places { size_of::<Cubic>() } else { 0 }
+        if self.wants_places { size_of::<Cubic>() } else { MOST_PLANES * size_of::<u32>() }
     }
 
     fn count(&self, leaf: &ChordLeaf, depth: usize, shape: &mut TreeShape) {
         let number: fn(&mut TreeShape) -> &mut u64 = match leaf {
             ChordLeaf::Empty => |shape| &mut shape.empty_leaves,
             ChordLeaf::Traced => |shape| &mut shape.traced_leaves,
-            ChordLeaf::Model(_) => |shape| &mut shape.smooth_leaves,
+            ChordLeaf::Planes(_) | ChordLeaf::Model(_) => |shape| &mut shape.smooth_leaves,
         };
         shape.count_leaf(depth, number);
     }
+}
+
+impl FewPlanes {
+    fn leaf(&self) -> ChordLeaf {
+        if self.planes.is_empty() {
+            ChordLeaf::Empty
+        } else {
+            ChordLeaf::Planes(self.planes.as_slice().into())
+        }
+    }
+}
+
+/// All samples of a cell miss.
+struct Missed {
+    samples: u64,
+    /// Whether all lines do, proved.
+    is_empty: bool,
 }
 
 /// What samples of a cell say.
@@ -245,6 +334,8 @@ struct CellFit {
     /// The largest that samples show, of F.
     error: f64,
     threshold: f64,
-    /// The share of hits that splitting would spare to be traced.
-    gain_of_split: f64,
+    /// The share of hits that are traced.
+    traced: f64,
+    /// The share that would be after a split.
+    traced_after_split: f64,
 }

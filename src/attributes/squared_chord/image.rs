@@ -18,6 +18,7 @@ use nalgebra::SMatrix;
 use pulp::{Simd, WithSimd};
 
 use super::outline::rows_within;
+use super::planes::ClipRuns;
 use super::{ChordLeaf, SquaredChord};
 use crate::exact::{BodyView, Engine, Lengths};
 use crate::geometry::{RayGrid, Region};
@@ -27,7 +28,7 @@ use crate::ritree::{Cache, FittedTree};
 
 /// Columns and rows of a block. Blocks lie on multiples of it, so that what a pixel gets does not depend on the region
 /// that it is asked in.
-const BLOCK: u32 = MOST_ROWS as u32;
+pub(super) const BLOCK: u32 = MOST_ROWS as u32;
 
 /// A body made ready for the rays of an image, to be found by its tree.
 pub struct ImageChords<'a> {
@@ -134,6 +135,14 @@ impl<'a> ImageChords<'a> {
             arch.dispatch(fill);
             tree.visit(LineFrame::pair(axis), &forms, pixels, cache, &mut |leaf, pixels| match leaf {
                 ChordLeaf::Empty => {}
+                ChordLeaf::Planes(few) => arch.dispatch(ClipRuns {
+                    planes: &tree.fit().plane_forms(few, &self.lines, axis),
+                    path_mm: self.lines.path_mm(),
+                    pixels,
+                    region,
+                    lengths: found.lengths,
+                    middles: found.middles.as_deref_mut(),
+                }),
                 ChordLeaf::Traced => found.open.extend(pixels.iter()),
                 ChordLeaf::Model(model) => {
                     let first_open = found.open.len();
@@ -212,7 +221,7 @@ fn aligned(range: &Range<u32>) -> impl Iterator<Item = u32> + use<> {
     (range.start / BLOCK * BLOCK..range.end).step_by(BLOCK as usize)
 }
 
-fn place_in(region: &Region, row: u32, columns: &Range<u32>) -> Range<usize> {
+pub(super) fn place_in(region: &Region, row: u32, columns: &Range<u32>) -> Range<usize> {
     let start = (row - region.rows.start) as usize * region.columns.len()
         + (columns.start - region.columns.start) as usize;
     start..start + columns.len()

@@ -20,27 +20,34 @@
 //! line is traced exactly: a narrow band along the outline. So one number, a length in mm, says where cells are split, which
 //! lines are traced, and how good the others are.
 //!
-//! **What is proved.** That a cell is empty, and that a pixel lies beyond the body's outline. A line of a cell that some lines
-//! hit is never taken to miss: it is known, or traced.
+//! **Few faces.** Along creases and on flat faces no cubic serves, but few faces are in sight: such cells keep the planes of
+//! all of them (`planes`), by which their lines are clipped exactly.
+//!
+//! **What is proved.** That a cell is empty, that a pixel lies beyond the body's outline, and that a line passes by a ball around
+//! the body. Any other line of a cell that some lines hit is taken to miss only by clipping: it is known, or traced.
 //!
 //! **Bodies that are not convex** have several chords on some lines, F stands for the square of their sum, and a thin part
 //! between a cell's samples could go unseen. So a cell is fitted only if all its lines cross the surface equally often, which
-//! is proved from the faces in its [shaft](shaft::Shaft); lines of all others are traced.
+//! is proved from the faces in its shaft (`shaft`); lines of all others are traced.
 
+mod batch;
 mod cubic;
 mod fit;
 mod image;
 mod outline;
+mod planes;
 mod samples;
 mod shaft;
 #[cfg(test)]
 mod tests;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
+use crate::exact::walk::Walker;
 use crate::exact::{Body, Engine};
 use crate::geometry::{Interval, Line};
 use crate::linespace::{LineFrame, PlanePair, is_in_range, squared_span};
+pub use batch::Asked;
 use cubic::Cubic;
 pub use image::{ImageChords, ImageLengths, Run, places_of};
 
@@ -68,6 +75,8 @@ pub enum ChordLeaf {
     Empty,
     /// All lines are traced.
     Traced,
+    /// Lines are clipped by these planes of the body, by their places among all of its planes.
+    Planes(Box<[u32]>),
     /// F is known, where it is not below a threshold.
     Model(ChordModel),
 }
@@ -117,19 +126,25 @@ pub enum Known {
     Nothing,
 }
 
+/// The frame of a map that makes about a ball of radius 1 of a body.
+fn frame_of(body: &Body, middle: DVec3, to_ball: DMat3) -> Option<LineFrame> {
+    // A hundredth more does no harm.
+    let reach = |axis: DVec3| {
+        let normal = to_ball.transpose() * axis;
+        body.surface().height_bound(normal, middle, 0.0, 0.01).0
+    };
+    let high = DVec3::new(reach(DVec3::X), reach(DVec3::Y), reach(DVec3::Z));
+    let low = -DVec3::new(reach(-DVec3::X), reach(-DVec3::Y), reach(-DVec3::Z));
+    LineFrame::new(middle, to_ball, low, high)
+}
+
 impl<'a> SquaredChord<'a> {
     /// The chords of `body` to within `tolerance_mm`; with `wants_places`, also where they lie. `None` if the body is too
     /// flat to have a frame.
     pub fn new(body: &'a Body, tolerance_mm: f64, wants_places: bool) -> Option<Self> {
         let (middle, to_ball) = body.ball_frame();
-        // The ball's radius is 1: a hundredth more does no harm.
-        let reach = |axis: DVec3| {
-            let normal = to_ball.transpose() * axis;
-            body.surface().height_bound(normal, middle, 0.0, 0.01).0
-        };
-        let high = DVec3::new(reach(DVec3::X), reach(DVec3::Y), reach(DVec3::Z));
-        let low = -DVec3::new(reach(-DVec3::X), reach(-DVec3::Y), reach(-DVec3::Z));
-        let frame = LineFrame::new(middle, to_ball, low, high)?;
+        let by_box = || DMat3::from_diagonal(DVec3::splat(2.0 / body.bounds().size().max_element()));
+        let frame = frame_of(body, middle, to_ball).or_else(|| frame_of(body, middle, by_box()))?;
         let engine = body.engine_for_rays();
         let fitter = Self {
             body,
@@ -167,9 +182,12 @@ impl<'a> SquaredChord<'a> {
     /// What a leaf knows of a line at `stuv`.
     #[inline]
     pub fn known(&self, leaf: &ChordLeaf, line: &Line, pair: PlanePair, stuv: &[f64; 4]) -> Known {
-        match leaf {
-            ChordLeaf::Empty => Known::Miss,
+        let known = match leaf {
+            ChordLeaf::Empty => return Known::Miss,
             ChordLeaf::Traced => Known::Nothing,
+            ChordLeaf::Planes(few) => {
+                return self.clip(few, line, pair).map_or(Known::Miss, |c| Known::Length(c.length()));
+            }
             ChordLeaf::Model(model) => {
                 let f = model.at(stuv);
                 // Written so that NaN is traced.
@@ -177,17 +195,25 @@ impl<'a> SquaredChord<'a> {
                     // |d in mm| is 1 over what the line's direction advances from plane to plane.
                     let [k, ..] = pair.axes();
                     let advance = self.frame.advance(k, line.dir()).abs();
-                    Known::Length(f.sqrt() / (squared_span(stuv) * advance))
-                } else {
-                    Known::Nothing
+                    return Known::Length(f.sqrt() / (squared_span(stuv) * advance));
                 }
+                Known::Nothing
             }
-        }
+        };
+        // In cells along the outline, most lines that are not known pass even a ball around the body by.
+        let passes_by = |walker: &Walker| walker.passes_by(line.origin(), line.dir());
+        if self.body.walker().is_some_and(passes_by) { Known::Miss } else { known }
     }
 
     /// Where along a line the middle of its chord lies, mm from the line's origin. `None` if the leaf does not know.
     pub fn middle_mm(&self, leaf: &ChordLeaf, line: &Line, pair: PlanePair, stuv: &[f64; 4]) -> Option<f64> {
-        let ChordLeaf::Model(model) = leaf else { return None };
+        let model = match leaf {
+            ChordLeaf::Model(model) => model,
+            ChordLeaf::Planes(few) => {
+                return self.clip(few, line, pair).map(|chord| 0.5 * (chord.start() + chord.end()));
+            }
+            ChordLeaf::Empty | ChordLeaf::Traced => return None,
+        };
         let middle = model.middle.as_ref()?.at(&model.local(stuv)) / squared_span(stuv);
         let [k, ..] = pair.axes();
         Some((middle - self.frame.point(line.origin())[k]) / self.frame.vector(line.dir())[k])

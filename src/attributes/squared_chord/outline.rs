@@ -1,7 +1,8 @@
 //! The pixels at which a body may be seen: those within a polygon around its outline.
 //!
 //! Each side of the polygon is a plane through the source that no vertex is beyond; found in a few steps (Dinkelbach 1967,
-//! doi:10.1287/mnsc.13.7.492), each to the vertex that is farthest beyond the last.
+//! doi:10.1287/mnsc.13.7.492), each to the vertex that is farthest beyond the last: by climbing over a surface that is strictly
+//! convex, by a search of all boxes elsewhere.
 
 use std::ops::Range;
 
@@ -10,8 +11,14 @@ use glam::DVec3;
 use crate::exact::walk::Walker;
 use crate::geometry::{ClosedMesh, RayGrid, Upstream};
 
-/// Sides of the polygon. A regular one of 24 sides is 0.6 % larger than the ellipse in it.
+/// Sides of the polygon. A regular one of 24 sides is 0.6 % larger than the ellipse in it, one of 96 sides 0.04 %.
 const SIDES: usize = 24;
+
+/// Sides that are found by climbing, which is quick.
+const CLIMBED_SIDES: usize = 96;
+
+/// Climbs for a side; each but the first few is in vain.
+const CLIMBS: usize = 8;
 
 /// Vertices that are looked up before any is searched for.
 const GUESSES: usize = 3;
@@ -21,6 +28,9 @@ const SLACK_PIXELS: f64 = 0.25;
 
 /// More than rounding can put a vertex off its place, pixels.
 const ROUNDING_PIXELS: f64 = 1e-6;
+
+/// A climb may end some roundings of heights below the highest vertex, once for each edge between the two: far less than this.
+const CLIMBING_PIXELS: f64 = 0.02;
 
 /// Where points are seen: column and row are `(p − from)·column / (p − from)·depth` and so on.
 struct Sight {
@@ -56,6 +66,52 @@ impl Sight {
         let v = point - self.from;
         v.dot(along) / (v.dot(self.depth) + self.constant_depth)
     }
+
+    /// How far along a direction of the image any vertex is seen, pixels, to within rounding. `None` if climbing does not tell.
+    fn climb(&self, walker: &Walker, along: DVec3, least_depth: f64) -> Option<f64> {
+        let mut most = f64::NEG_INFINITY;
+        let mut normal = along;
+        for _ in 0..CLIMBS {
+            let vertex = walker.highest_vertex(normal)?;
+            let at = self.place(vertex, along);
+            if at <= most {
+                // No vertex is above the side through the last.
+                let above = normal.dot(vertex - self.from) - most * self.constant_depth;
+                return Some(most + above.max(0.0) / least_depth + CLIMBING_PIXELS);
+            }
+            most = at;
+            normal = along - most * self.depth;
+        }
+        None
+    }
+
+    /// As [`climb`](Self::climb), over any surface, to within some slack. `touching` is a vertex to begin with.
+    fn search(
+        &self,
+        surface: &ClosedMesh,
+        walker: Option<&Walker>,
+        along: DVec3,
+        least_depth: f64,
+        touching: &mut DVec3,
+    ) -> f64 {
+        let slack = SLACK_PIXELS * least_depth;
+        let mut most = self.place(*touching, along);
+        for walker in walker.iter().flat_map(|walker| [walker; GUESSES]) {
+            most = most.max(self.place(walker.vertex_towards(along - most * self.depth), along));
+        }
+        loop {
+            let normal = along - most * self.depth;
+            let base = most * self.constant_depth;
+            let (bound, vertex) = surface.height_bound(normal, self.from, base, slack);
+            match vertex.filter(|_| bound - base > 2.0 * slack) {
+                Some(vertex) => {
+                    *touching = vertex;
+                    most = self.place(vertex, along).max(most);
+                }
+                None => return most + (bound - base) / least_depth + ROUNDING_PIXELS,
+            }
+        }
+    }
 }
 
 /// The shares of the way from start to end, of all points of the surface's box.
@@ -88,39 +144,29 @@ pub fn rows_within(surface: &ClosedMesh, walker: Option<&Walker>, grid: &RayGrid
     let mut lows = vec![0.0_f64; rows as usize];
     let mut highs = vec![f64::from(columns - 1); rows as usize];
     let mut touching = surface.bounds().centre();
-    for side in 0..SIDES {
-        let (sin, cos) = (std::f64::consts::TAU * side as f64 / SIDES as f64).sin_cos();
+    let climber = walker.filter(|walker| walker.highest_vertex(sight.column).is_some());
+    let sides = if climber.is_some() { CLIMBED_SIDES } else { SIDES };
+    for side in 0..sides {
+        let (sin, cos) = (std::f64::consts::TAU * side as f64 / sides as f64).sin_cos();
         let along = cos * sight.column + sin * sight.row;
-        let slack = SLACK_PIXELS * least_depth;
-        let mut most = sight.place(touching, along);
-        for walker in walker.iter().flat_map(|walker| [walker; GUESSES]) {
-            most = most.max(sight.place(walker.vertex_towards(along - most * sight.depth), along));
-        }
-        loop {
-            let normal = along - most * sight.depth;
-            let base = most * sight.constant_depth;
-            let (bound, vertex) = surface.height_bound(normal, sight.from, base, slack);
-            match vertex.filter(|_| bound - base > 2.0 * slack) {
-                Some(vertex) => {
-                    touching = vertex;
-                    most = sight.place(vertex, along).max(most);
-                }
-                None => {
-                    most += (bound - base) / least_depth + ROUNDING_PIXELS;
-                    break;
-                }
-            }
-        }
-        for row in 0..rows {
-            let at = (most - sin * f64::from(row)) / cos;
-            let i = row as usize;
-            if cos > 1e-9 {
-                highs[i] = highs[i].min(at);
-            } else if cos < -1e-9 {
-                lows[i] = lows[i].max(at);
-            } else if sin * f64::from(row) > most {
-                highs[i] = -1.0;
-            }
+        let most = match climber.and_then(|walker| sight.climb(walker, along, least_depth)) {
+            Some(most) => most,
+            None => sight.search(surface, walker, along, least_depth, &mut touching),
+        };
+        // Columns at which a row meets the side: those beyond miss.
+        let (per_row, at_row_0) = (-sin / cos, most / cos);
+        let at = |row: usize| at_row_0 + per_row * row as f64;
+        if cos > 1e-9 {
+            highs.iter_mut().enumerate().for_each(|(row, high)| *high = high.min(at(row)));
+        } else if cos < -1e-9 {
+            lows.iter_mut().enumerate().for_each(|(row, low)| *low = low.max(at(row)));
+        } else {
+            let is_beyond = |row: usize| sin * row as f64 > most;
+            highs
+                .iter_mut()
+                .enumerate()
+                .filter(|(row, _)| is_beyond(*row))
+                .for_each(|(_, high)| *high = -1.0);
         }
     }
     let runs = lows.iter().zip(&highs);

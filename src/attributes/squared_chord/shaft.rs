@@ -68,14 +68,18 @@ impl<'s> Shaft<'s> {
 
     /// Whether no line of the cell meets the body, proved by one plane that has all of it behind.
     pub fn misses_all(&self) -> bool {
-        let mut planes = self.planes.iter();
-        planes.any(|&(n, least)| self.surface.farthest_vertex(n, self.origin, least).is_none())
+        self.planes.iter().any(|&(n, least)| !self.surface.reaches_above(n, self.origin, least))
     }
 
     /// Whether a plane parts the shaft from the hull of some points.
     fn misses(&self, points: &[DVec3]) -> bool {
         let is_behind = |(n, least): &(DVec3, f64)| points.iter().all(|p| n.dot(*p - self.origin) < *least);
         self.planes.iter().any(is_behind)
+    }
+
+    /// Whether a point of the body lies in the shaft, so that a line of the cell meets it.
+    pub fn holds(&self, point: DVec3) -> bool {
+        self.planes.iter().all(|&(n, least)| n.dot(point - self.origin) >= least)
     }
 
     fn misses_box(&self, bounds: &Bounds) -> bool {

@@ -1,63 +1,17 @@
 //! The contract, over shapes that are the model's best and worst cases; and the laws of trees.
 
+mod shapes;
+
 use glam::{DMat3, DVec3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::*;
 use crate::exact::Lengths;
-use crate::geometry::primitives::{cube, icosphere, prism};
-use crate::geometry::{ClosedMesh, RayGrid, Region, Segment, TriMesh, Upstream, convex_hull};
+use crate::geometry::primitives::{cube, prism};
+use crate::geometry::{RayGrid, Region, Segment, Upstream};
 use crate::ritree::{Cache, FittedTree, oldest_to_keep};
-
-fn body(mesh: TriMesh) -> Body {
-    let body = Body::new(ClosedMesh::new(mesh).expect("closed").0);
-    assert!(body.convexity().is_ok(), "{}", body.convexity().expect_err("not convex"));
-    body
-}
-
-fn turn() -> DMat3 {
-    DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.7)
-}
-
-fn ellipsoid(subdivisions: u32) -> Body {
-    body(
-        icosphere(subdivisions)
-            .map_vertices(|v| turn() * (v * DVec3::new(100.0, 80.0, 60.0)) + DVec3::new(7.0, -300.0, 1e3)),
-    )
-}
-
-/// The hull of a smooth body that no ellipsoid is like: of the fourth power.
-fn superellipsoid() -> Body {
-    let points: Vec<DVec3> = icosphere(4)
-        .vertices
-        .iter()
-        .map(|v| turn() * (*v / v.abs().powf(4.0).element_sum().powf(0.25) * DVec3::new(90.0, 50.0, 70.0)))
-        .collect();
-    body(convex_hull(&points).expect("a hull"))
-}
-
-/// An ellipsoid cut flat on one side.
-fn cut_ellipsoid() -> Body {
-    let points: Vec<DVec3> = icosphere(4)
-        .vertices
-        .iter()
-        .map(|v| turn() * (v.with_z(v.z.min(0.3)) * DVec3::new(100.0, 80.0, 60.0)))
-        .collect();
-    body(convex_hull(&points).expect("a hull"))
-}
-
-fn shapes() -> Vec<(&'static str, Body)> {
-    vec![
-        ("ellipsoid", ellipsoid(4)),
-        ("superellipsoid", superellipsoid()),
-        ("cut ellipsoid", cut_ellipsoid()),
-        ("cylinder", body(prism(64).map_vertices(|v| v * DVec3::new(40.0, 40.0, 90.0)))),
-        ("box", body(cube(1.0).map_vertices(|v| turn() * (v * DVec3::new(100.0, 60.0, 30.0))))),
-        ("needle", body(icosphere(3).map_vertices(|v| turn() * (v * DVec3::new(100.0, 0.1, 0.1))))),
-        ("plate", body(cube(1.0).map_vertices(|v| turn() * (v * DVec3::new(100.0, 100.0, 0.01))))),
-    ]
-}
+use shapes::{body, cut_ellipsoid, ellipsoid, general_shapes, shapes, superellipsoid, turn};
 
 /// Lines through two points of a somewhat larger ellipsoid of inertia: as many hit a needle as a ball.
 fn lines_near(body: &Body, seed: u64, count: usize) -> Vec<Line> {
@@ -70,7 +24,9 @@ fn lines_near(body: &Body, seed: u64, count: usize) -> Vec<Line> {
 }
 
 fn exact_mm(body: &Body, line: &Line) -> f64 {
-    body.clipper().expect("convex").chord(line).map_or(0.0, |chord| chord.length())
+    let mut parts = Vec::new();
+    body.chords_by(Engine::Clip, line, &mut parts);
+    parts.iter().map(Interval::length).sum()
 }
 
 /// Lengths that a tree knows, with the exact ones.
@@ -80,21 +36,22 @@ fn known_lengths(
     cache: &Cache,
     lines: &[Line],
 ) -> Vec<[f64; 2]> {
-    let of_line = |line: &Line| {
-        let exact = exact_mm(body, line);
-        let Some((pair, stuv)) = tree.fit().place_of(line) else { return Some([0.0, exact]) };
-        match tree.ask(pair, &stuv, cache, |leaf, _| tree.fit().known(leaf, line, pair, &stuv)) {
-            Known::Miss => Some([0.0, exact]),
-            Known::Length(length) => Some([length, exact]),
-            Known::Nothing => None,
-        }
-    };
-    lines.iter().filter_map(of_line).collect()
+    let mut known = Vec::new();
+    SquaredChord::ask_all(tree, lines.iter().enumerate(), cache, |_, line, asked| {
+        let of_leaf = |(leaf, pair, stuv): Asked| tree.fit().known(leaf, line, pair, stuv);
+        let length = match asked.map_or(Known::Miss, of_leaf) {
+            Known::Miss => 0.0,
+            Known::Length(length) => length,
+            Known::Nothing => return,
+        };
+        known.push([length, exact_mm(body, line)]);
+    });
+    known
 }
 
 #[test]
 fn of_a_thousand_lengths_999_are_within_the_tolerance_and_none_beyond_five_times_it() {
-    for (name, body) in shapes() {
+    for (name, body) in shapes().into_iter().chain(general_shapes()) {
         let unit_mm = 0.5 * body.bounds().size().max_element();
         for share in [0.05, 0.005] {
             let tolerance_mm = share * unit_mm;
@@ -124,8 +81,59 @@ fn smooth_bodies_are_mostly_known() {
 }
 
 #[test]
+fn lines_that_see_few_faces_are_clipped_exactly() {
+    let of_box = body(cube(1.0).map_vertices(|v| turn() * (v * DVec3::new(100.0, 60.0, 30.0))));
+    let of_prism = body(prism(64).map_vertices(|v| v * DVec3::new(40.0, 40.0, 90.0)));
+    for (body, least) in [(of_box, 0.98), (of_prism, 0.9)] {
+        let tree = FittedTree::new(SquaredChord::new(&body, 1e-3, true).expect("convex"));
+        let lines = lines_near(&body, 9, 2_000);
+        let known = known_lengths(&body, &tree, &Cache::new(1 << 30), &lines);
+        assert!(known.len() as f64 >= least * lines.len() as f64, "{} of {}", known.len(), lines.len());
+        for [length, exact] in known {
+            assert!((length - exact).abs() < 1e-9, "{length}, not {exact}");
+        }
+    }
+}
+
+#[test]
+fn what_is_not_convex_is_known_where_no_outline_is_near() {
+    for (name, body) in general_shapes() {
+        let tree = FittedTree::new(SquaredChord::new(&body, 2.0, false).expect("a frame"));
+        let lines = lines_near(&body, 6, 4_000);
+        let hits = lines.iter().filter(|line| exact_mm(&body, line) > 0.0).count();
+        let known = known_lengths(&body, &tree, &Cache::new(1 << 30), &lines);
+        let known_hits = known.iter().filter(|[_, exact]| *exact > 0.0).count();
+        assert!(3 * known_hits > hits, "{name}: {known_hits} of {hits} are known");
+    }
+}
+
+#[test]
+fn thin_parts_of_a_body_are_never_left_out() {
+    // Lines aimed at the sliver and the hair, through the ball or past it: each length has all parts, or is traced.
+    for (name, body) in general_shapes().into_iter().skip(3) {
+        let tree = FittedTree::new(SquaredChord::new(&body, 0.5, false).expect("a frame"));
+        let cache = Cache::new(1 << 30);
+        let surface = body.surface().mesh();
+        let thin: Vec<_> = surface.faces.iter().filter(|face| face[0] >= 642).collect();
+        let mut rng = Pcg64::seed_from_u64(8);
+        let mut lines = Vec::new();
+        for _ in 0..2_000 {
+            let [a, b, c] = thin[rng.random_range(0..thin.len())].map(|v| surface.vertices[v as usize]);
+            let target = a.lerp(b, rng.random_range(0.0..0.5)).lerp(c, rng.random_range(0.0..0.5));
+            let from = 50.0 * DVec3::from([0; 3].map(|_| rng.random_range(-1.0..1.0)));
+            lines.extend(Segment::between(from + 9.0 * (from - target), target).map(|s| *s.line()));
+        }
+        let known = known_lengths(&body, &tree, &cache, &lines);
+        assert!(known.len() < lines.len(), "{name}");
+        for [length, exact] in known {
+            assert!((length - exact).abs() < 2.5, "{name}: {length} for {exact}");
+        }
+    }
+}
+
+#[test]
 fn a_body_is_never_lost() {
-    for (name, body) in shapes() {
+    for (name, body) in shapes().into_iter().chain(general_shapes()) {
         let tree = FittedTree::new(SquaredChord::new(&body, 0.5, false).expect("convex"));
         let known = known_lengths(&body, &tree, &Cache::new(1 << 30), &lines_near(&body, 3, 4_000));
         let lost = known.iter().filter(|[length, exact]| *length == 0.0 && *exact > 0.0).count();
@@ -165,8 +173,13 @@ fn grids(size: u32, centre: DVec3) -> [RayGrid; 2] {
 
 #[test]
 fn runs_find_what_single_rays_find() {
-    let body = superellipsoid();
-    let tree = FittedTree::new(SquaredChord::new(&body, 0.3, true).expect("convex"));
+    runs_are_single_rays(&superellipsoid(), 2_000);
+    runs_are_single_rays(&general_shapes().swap_remove(0).1, 1_000);
+    runs_are_single_rays(&shapes().swap_remove(3).1, 1_500);
+}
+
+fn runs_are_single_rays(body: &Body, least: usize) {
+    let tree = FittedTree::new(SquaredChord::new(body, 0.3, true).expect("a frame"));
     let cache = Cache::new(1 << 30);
     for grid in grids(150, DVec3::ZERO) {
         let image = ImageChords::new(tree.fit(), &grid).expect("between source and pixels");
@@ -203,20 +216,27 @@ fn runs_find_what_single_rays_find() {
                 }
                 // Beyond the outline, a run knows more; thresholds of runs are those of a block's largest path.
                 _ if !is_open[i] => {
-                    assert_eq!((lengths[i], exact_mm(&body, &line)), (0.0, 0.0));
+                    assert_eq!((lengths[i], exact_mm(body, &line)), (0.0, 0.0));
                     misses += 1;
                 }
                 (Known::Nothing, _) => {}
+                // A single line may pass a ball around the body by.
+                (Known::Miss, _) => assert_eq!(exact_mm(body, &line), 0.0),
                 _ => differ += 1,
             }
         }
-        assert!(compared > 2_000 && misses > 100 && differ < compared / 8, "{compared} {misses} {differ}");
+        assert!(compared > least && misses > 100 && differ < compared / 3, "{compared} {misses} {differ}");
     }
 }
 
 #[test]
 fn what_a_pixel_gets_depends_neither_on_its_region_nor_on_the_cache() {
-    let body = cut_ellipsoid();
+    for body in [cut_ellipsoid(), general_shapes().swap_remove(0).1] {
+        pixels_keep_their_bits(&body);
+    }
+}
+
+fn pixels_keep_their_bits(body: &Body) {
     let [grid, _] = grids(150, DVec3::ZERO);
     let length_bits = |tree: &FittedTree<SquaredChord>, cache: &Cache, region: &Region| {
         let image = ImageChords::new(tree.fit(), &grid).expect("between source and pixels");
@@ -224,7 +244,7 @@ fn what_a_pixel_gets_depends_neither_on_its_region_nor_on_the_cache() {
         image.trace(tree, region, cache, &mut lengths, &mut Vec::new());
         region.places().zip(lengths.into_iter().map(f64::to_bits)).collect::<Vec<_>>()
     };
-    let new = || FittedTree::new(SquaredChord::new(&body, 0.5, false).expect("convex"));
+    let new = || FittedTree::new(SquaredChord::new(body, 0.5, false).expect("a frame"));
     let whole: std::collections::HashMap<_, _> =
         length_bits(&new(), &Cache::new(1 << 30), &grid.whole()).into_iter().collect();
     let regions = [(100..150, 0..40), (3..70, 60..150), (64..128, 64..128), (17..18, 30..110)];
@@ -279,11 +299,23 @@ fn single_lines_and_threads_get_the_same_bits() {
         }
     });
     assert_eq!(tree.check_invariants(), cache.used_bytes());
+    // Many at a time, from a tree that is kept and from one that cannot be.
+    for (tree, cache) in [(&alone, &roomy), (&new(), &Cache::new(0))] {
+        let mut found = vec![None; lines.len()];
+        SquaredChord::ask_all(tree, lines.iter().enumerate(), cache, |i, line, asked| {
+            if let Some((leaf, pair, stuv)) = asked
+                && let Known::Length(length) = tree.fit().known(leaf, line, pair, stuv)
+            {
+                found[i] = Some(length.to_bits());
+            }
+        });
+        assert_eq!(found, expected);
+    }
 }
 
 #[test]
 fn pixels_beyond_the_outline_miss_and_few_within_do() {
-    for (name, body) in shapes() {
+    for (name, body) in shapes().into_iter().chain(general_shapes()) {
         for grid in grids(200, body.bounds().centre()) {
             let rows = outline::rows_within(body.surface(), body.walker(), &grid)
                 .expect("between source and pixels");
@@ -297,7 +329,11 @@ fn pixels_beyond_the_outline_miss_and_few_within_do() {
                 hits += usize::from(lengths[i] > 0.0);
             }
             // A polygon of given directions is wide about a needle askew.
-            assert!(within <= hits + hits / 10 + 2500, "{name}: {within} pixels for {hits} hits");
+            let is_convex = body.convexity().is_ok();
+            assert!(
+                !is_convex || within <= hits + hits / 10 + 2500,
+                "{name}: {within} pixels for {hits} hits"
+            );
         }
     }
 }

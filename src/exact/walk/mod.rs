@@ -16,6 +16,7 @@
 //! the outline, faces seen nearly edge-on, and walks longer than any should be, are [`Unsure`] and go to an engine that is not in doubt.
 
 mod abreast;
+mod climb;
 mod held;
 mod seeds;
 mod sets;
@@ -23,6 +24,7 @@ mod sets;
 mod tests;
 
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
 use super::shear::Shear;
 use crate::geometry::numeric::{UNIT_ROUNDOFF, gamma};
@@ -67,6 +69,8 @@ pub struct Walker {
     outline_slack: f64,
     /// No walk over a fair mesh is longer than a few times across it.
     longest_walk: u32,
+    /// Whether no edge is flat or reflex, so that one can climb.
+    is_strict: bool,
     seeds: SeedTable,
 }
 
@@ -110,11 +114,12 @@ impl Walker {
         };
         let bounds = body.bounds();
         let mut walker = Self {
-            faces: (0..mesh.faces.len()).map(face).collect(),
+            faces: (0..mesh.faces.len()).into_par_iter().map(face).collect(),
             centre: bounds.centre(),
             reach: 0.5 * bounds.size().max_element(),
             outline_slack: OUTLINE_FACTOR * body.reflex_depth_mm(),
             longest_walk: 16 + 8 * mesh.faces.len().isqrt() as u32,
+            is_strict: body.is_strict(),
             seeds: SeedTable::empty(),
             vertices: mesh.vertices,
         };

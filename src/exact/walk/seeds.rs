@@ -10,6 +10,7 @@
 //! For an ellipsoid the ball is the body; elsewhere the distance found first says where to look again.
 
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
 use super::{Face, LineView, Seeds, Walker};
 use crate::geometry::numeric::gamma;
@@ -81,18 +82,17 @@ impl SeedTable {
             cells: vec![Seed::default(); side * side],
         };
         let from_ball = to_ball.inverse();
-        let mut face = 0;
-        for row in 0..side {
-            for i in 0..side {
-                // Back and forth, so that each walk begins next to where the last ended.
-                let column = if row % 2 == 0 { i } else { side - 1 - i };
+        let rows = table.cells.par_chunks_mut(side).enumerate();
+        rows.for_each(|(row, cells)| {
+            // Each walk begins next to where the last ended.
+            let mut face = 0;
+            for (column, cell) in cells.iter_mut().enumerate() {
                 let towards = from_ball * direction([column, row].map(|c| (c as f64 + 0.5) / side as f64));
                 face = leaving(walker, middle, towards, face);
                 let corner = walker.vertices[walker.faces[face as usize].corners[0] as usize];
-                let radius = radius_squared(&corner).sqrt() as f32;
-                table.cells[row * side + column] = Seed { face, radius };
+                *cell = Seed { face, radius: radius_squared(&corner).sqrt() as f32 };
             }
-        }
+        });
         table
     }
 

@@ -6,9 +6,10 @@ use std::sync::{OnceLock, PoisonError, RwLock, RwLockReadGuard};
 use serde::Serialize;
 
 use crate::attributes::chord::ChordLength;
-use crate::attributes::squared_chord::{ImageChords, ImageLengths, Known, SquaredChord};
+use crate::attributes::squared_chord::{Asked, ImageChords, ImageLengths, Known, SquaredChord};
 use crate::exact::{Body, Spans};
 use crate::geometry::{Interval, RayGrid, Region, Segment};
+use crate::linespace::LineSpace;
 use crate::modes::project::Found;
 use crate::ritree::{Answer, BuildCounts, Cache, Descent, FittedTree, Parameters, Reason, RiTree, TreeShape};
 
@@ -51,6 +52,9 @@ pub struct TreeSettings {
     /// Bodies with fewer face planes than this are clipped: that is cheaper than a query. Asked one beside the other, warm, a
     /// quadrilinear query is as dear as clipping some 40 planes (70 while the tree is built, 150 or more of rays in no order).
     pub least_planes: usize,
+    /// Whether bodies that are not convex have trees of squared chords. In images, where the raster is quicker than trees that
+    /// leave their outlines to be traced, that pays for bodies of many more faces than pixels only.
+    pub general_bodies: bool,
 }
 
 /// From so many face planes on, and for so many rays, trees of squared chords are quicker than the exact engines: an
@@ -69,6 +73,7 @@ impl Default for TreeSettings {
             cache_bytes: 100_000_000,
             kept_share: 0.3,
             least_planes: 48,
+            general_bodies: true,
         }
     }
 }
@@ -92,7 +97,7 @@ pub struct QueryCounts {
     pub traced_source_or_target_inside: u64,
     /// Traced: the model of the squared chord may be off by more than the tolerance, as along the body's outline.
     pub traced_tolerance: u64,
-    /// Not asked: the body is not convex, or has so few faces that clipping is cheaper.
+    /// Not asked: the body has no tree, as it is not convex, or has so few faces that clipping is cheaper.
     pub traced_without_tree: u64,
 }
 
@@ -200,9 +205,14 @@ impl<'a> Forest<'a> {
 
     /// Whether an organ's body is put in a tree.
     pub fn grows(&self, organ: usize) -> bool {
-        let convex = self.bodies[organ].convexity();
-        convex.is_ok_and(|convex| convex.planes().len() >= self.settings.least_planes)
-            && ChordLength::new(self.bodies[organ]).is_some()
+        let body = self.bodies[organ];
+        let planes = match body.convexity() {
+            Ok(convex) => convex.planes().len(),
+            // The paper's trees know one chord of a line.
+            Err(_) if self.settings.general_bodies && self.finds_runs() => body.surface().mesh().faces.len(),
+            Err(_) => return false,
+        };
+        planes >= self.settings.least_planes && LineSpace::new(body.bounds()).is_some()
     }
 
     fn new_tree(&self, organ: usize) -> Option<OrganTree<'a>> {
@@ -353,17 +363,35 @@ impl<'a> Grove<'_, 'a> {
         spans: &mut Spans,
         mut answer: impl FnMut(usize, Found, Option<Interval>),
     ) {
-        let bounds = body.bounds();
-        let mut descent = tree.descent();
         let (mut open, mut open_rays) = (Vec::new(), Vec::new());
-        for (i, ray) in rays.iter().enumerate() {
-            match holds_box(ray, &bounds).then(|| self.chord(&mut descent, ray)) {
-                Some(Ok(chord)) => answer(i, Found::Interpolated, chord),
-                Some(Err(_)) | None => {
-                    answer(i, Found::Traced, None);
-                    open.push(i);
-                    open_rays.push(*ray);
+        let mut answer_or_keep = |i: usize, chord: Option<Option<Interval>>| match chord {
+            Some(chord) => answer(i, Found::Interpolated, chord),
+            None => {
+                answer(i, Found::Traced, None);
+                open.push(i);
+                open_rays.push(rays[i]);
+            }
+        };
+        let bounds = body.bounds();
+        match tree {
+            OrganTree::Quadrilinear(_) => {
+                let mut descent = tree.descent();
+                for (i, ray) in rays.iter().enumerate() {
+                    let chord =
+                        if holds_box(ray, &bounds) { self.chord(&mut descent, ray).ok() } else { None };
+                    answer_or_keep(i, chord);
                 }
+            }
+            OrganTree::SquaredChord(tree) => {
+                for (i, _) in rays.iter().enumerate().filter(|(_, ray)| !holds_box(ray, &bounds)) {
+                    answer_or_keep(i, None);
+                }
+                let whole = rays.iter().enumerate().filter(|(_, ray)| holds_box(ray, &bounds));
+                let lines = whole.map(|(i, ray)| (i, ray.line()));
+                SquaredChord::ask_all(tree, lines, &self.forest.cache, |i, line, asked| {
+                    let chord = |(leaf, pair, stuv): Asked| tree.fit().chord(leaf, line, pair, stuv);
+                    answer_or_keep(i, asked.map_or(Some(None), chord));
+                });
             }
         }
         body.trace(body.engine_for_rays(), 0, &open_rays, spans);
