@@ -102,12 +102,11 @@ impl Attribute for ChordLength<'_> {
         true
     }
 
-    /// See [`Cell::shaft_planes`]: each is held against the body's farthest vertex.
+    /// See [`Cell::shaft_planes`]: the body may not reach above one of them.
     fn is_certainly_empty(&self, pair: PlanePair, cell: &Cell) -> bool {
         let (min, size) = (self.space.min(), self.space.size());
         cell.shaft_planes(pair).any(|(normal, least)| {
-            let highest = self.body.surface().farthest_vertex(normal / size, min, f64::NEG_INFINITY);
-            highest.is_some_and(|(height, _)| height - least < -LEAST_SEPARATION)
+            !self.body.surface().reaches_above(normal / size, min, least - LEAST_SEPARATION)
         })
     }
 }
@@ -178,6 +177,72 @@ mod tests {
         tree.check_invariants();
     }
 
+    /// How far interpolated lengths are from exact ones, in thresholds, of lines with chords of half the longest at least:
+    /// those are away from the outline.
+    fn errors_in_thresholds(body: &Body, threshold: f64, lines: impl Iterator<Item = Line>) -> Vec<f64> {
+        let chords = ChordLength::new(body).expect("convex");
+        let parameters = Parameters { distance_threshold: threshold, ..Parameters::default() };
+        let (tree, cache) = (RiTree::new(chords, parameters), Cache::new(1 << 30));
+        let error = |line: Line| {
+            let exact = exact(body, &line).filter(|chord| chord.length() > 60.0)?;
+            let point = tree.attribute().space().point_of(&line);
+            match tree.query(point, &cache)? {
+                Answer::Interpolated(Some(chord)) => {
+                    let off = (f64::from(chord.length_mm) - exact.length()).abs();
+                    Some(off / (threshold * tree.attribute().unit_mm))
+                }
+                Answer::Interpolated(None) => panic!("{line:?} misses, but for {} mm", exact.length()),
+                Answer::Trace(_) => None,
+            }
+        };
+        let errors = lines.filter_map(error).collect();
+        tree.check_invariants();
+        errors
+    }
+
+    #[test]
+    fn away_from_the_outline_lengths_agree_with_exact_ones_within_the_threshold() {
+        let body = ellipsoid();
+        for threshold in [0.1, 0.03, 0.01] {
+            let mut errors = errors_in_thresholds(&body, threshold, lines_near(&body, 5, 3_000));
+            errors.sort_unstable_by(f64::total_cmp);
+            let within = errors.partition_point(|error| *error <= 1.0);
+            assert!(errors.len() > 500, "{threshold}: {}", errors.len());
+            // The test is at a cell's centre: a few lines beside it are farther off.
+            assert!(
+                within as f64 > 0.97 * errors.len() as f64 && errors[errors.len() - 1] < 3.0,
+                "{threshold}: {within} of {}, the worst {}",
+                errors.len(),
+                errors[errors.len() - 1]
+            );
+        }
+    }
+
+    #[test]
+    fn where_the_dominant_axis_changes_both_trees_agree_with_the_exact_chord() {
+        let body = ellipsoid();
+        let (size, centre) = (body.bounds().size(), body.bounds().centre());
+        let mut pairs = std::collections::BTreeSet::new();
+        let mut ties = Vec::new();
+        let space = LineSpace::new(body.bounds()).expect("a box");
+        for i in 0..600_u32 {
+            // Equal in box units but for the sign, or a unit in the last place apart.
+            let (first, sign) = (i as usize % 3, if i % 2 == 0 { 1.0 } else { -1.0 });
+            let mut towards = DVec3::splat(1.0);
+            towards[(first + 2) % 3] = f64::from(i % 19) / 10.0 - 0.9;
+            towards[first] = sign * [1.0, 1.0_f64.next_up(), 1.0_f64.next_down()][i as usize / 6 % 3];
+            let aside = DVec3::new(f64::from(i % 7) - 3.0, f64::from(i % 11) - 5.0, f64::from(i % 5) - 2.0);
+            let line = Line::new(centre + 4.0 * aside, UnitDir::new(size * towards).expect("a direction"));
+            let line = line.expect("finite");
+            pairs.insert(space.point_of(&line).pair.index());
+            ties.push(line);
+        }
+        assert_eq!(pairs.len(), 6, "{pairs:?}");
+        let errors = errors_in_thresholds(&body, 0.03, ties.into_iter());
+        let worst = errors.iter().copied().fold(0.0, f64::max);
+        assert!(errors.len() > 300 && worst < 3.0, "{} lines, the worst {worst}", errors.len());
+    }
+
     #[test]
     fn a_body_is_never_lost_however_thin_or_small_its_cells() {
         // A plate 1/10 000 of its width thick, oblique to all axes: lines through it, most cells of which have no
@@ -204,6 +269,7 @@ mod tests {
                     assert_ne!(answer, Some(Answer::Interpolated(None)), "lost at depth {max_depth}");
                     assert_ne!(answer, None, "lost out of range");
                 }
+                assert_eq!(tree.check_invariants(), cache.used_bytes());
             }
         }
     }
@@ -257,5 +323,6 @@ mod tests {
             }
         }
         assert!(tree.build_counts().samples_taken > 0);
+        tree.check_invariants();
     }
 }

@@ -77,6 +77,7 @@ impl Place {
     }
 
     /// Which half holds the point: 0 or 1.
+    #[inline]
     pub fn side_of<R: Real>(&self, stuv: &[f64; 4]) -> usize {
         let axis = self.axis();
         let middle = R::of(0.5) * (R::of(self.cell.low[axis]) + R::of(self.cell.high[axis]));
@@ -84,8 +85,19 @@ impl Place {
     }
 
     /// One half: 0 or 1.
+    #[inline]
     pub fn half(&self, side: usize) -> Self {
         Self { cell: self.cell.halves(self.axis())[side], depth: self.depth + 1, ..*self }
+    }
+
+    /// Whether a descent for the line comes through this cell: cells hold their lower border, and those on the rim of the range
+    /// what is rounded beyond it.
+    #[inline]
+    pub fn holds(&self, line: &LinePoint) -> bool {
+        let (Cell { low, high }, rim) = (&self.cell, Cell::ROOT);
+        let is_above = |a: usize| line.stuv[a] >= low[a] || low[a] == rim.low[a];
+        let is_below = |a: usize| line.stuv[a] < high[a] || high[a] == rim.high[a];
+        self.pair == line.pair && (0..4).all(|a| is_above(a) && is_below(a))
     }
 
     fn line(&self, stuv: [f64; 4]) -> LinePoint {

@@ -19,6 +19,7 @@
 pub mod attribute;
 mod cache;
 mod cell;
+mod descent;
 mod fitted;
 mod node;
 mod stats;
@@ -31,13 +32,14 @@ use std::sync::atomic::{AtomicU32, Ordering};
 pub use attribute::Attribute;
 pub use cache::{Cache, oldest_to_keep};
 pub use cell::{Place, Reason};
+pub use descent::Descent;
 pub use fitted::{Fit, Fitted, FittedTree};
 pub use stats::{BuildCounts, TreeShape};
 
 use crate::geometry::Real;
-use crate::linespace::{LinePoint, PlanePair, is_in_range};
+use crate::linespace::{LinePoint, PlanePair};
 use cell::{Kind, Verdict, quadrilinear};
-use node::{Leaf, Node};
+use node::Node;
 use stats::BuildCounters;
 
 /// The tree's settings; the defaults are the paper's.
@@ -102,34 +104,12 @@ impl<A: Attribute> RiTree<A> {
 
     /// As [`query`](Self::query), with the depth of the final cell that answers: a function of the line alone, too.
     pub fn query_with_depth(&self, line: LinePoint, cache: &Cache) -> Option<(Answer<A::Output>, u32)> {
-        let line =
-            if self.attribute.is_symmetric() && line.pair.is_reversed() { line.reversed() } else { line };
-        if !line.stuv.iter().all(|x| x.is_finite()) {
-            // Overflow on the way to box units says nothing about the line.
-            return Some((Answer::Trace(Reason::Guard), 0));
-        }
-        if !is_in_range(&line.stuv) {
-            return None;
-        }
-        let mut place = Place::root(line.pair);
-        let Some(mut node) = self.root(line.pair, cache) else {
-            return Some(self.answer_without_keeping(place, None, line.stuv));
-        };
-        loop {
-            if let Some(leaf) = node.leaf() {
-                leaf.touch(self.clock.load(Ordering::Relaxed));
-                return Some((self.answer(&place, leaf, line.stuv), place.depth));
-            }
-            if node.halves().is_none() {
-                match node.expand(&place, self, cache) {
-                    Ok(()) => continue,
-                    Err(corners) => return Some(self.answer_without_keeping(place, corners, line.stuv)),
-                }
-            }
-            let Some(halves) = node.halves() else { continue };
-            let side = place.side_of::<A::Real>(&line.stuv);
-            (node, place) = (&halves[side], place.half(side));
-        }
+        self.descent().query_with_depth(line, cache)
+    }
+
+    /// To ask for many lines, one near the other if it can be: the same answers, sooner.
+    pub fn descent(&self) -> Descent<'_, A> {
+        Descent::new(self)
     }
 
     /// The root of a plane pair's tree, made if need be. `None` if the cache has no room for it.
@@ -148,33 +128,14 @@ impl<A: Attribute> RiTree<A> {
         root.get().map(|node| &**node)
     }
 
-    /// The same answer, computed on a path that is not kept.
-    fn answer_without_keeping(
+    fn answer(
         &self,
-        mut place: Place,
-        corners: Option<Box<cell::Corners<A::Output>>>,
+        place: &Place,
+        kind: Kind,
+        corners: &cell::Corners<A::Output>,
         stuv: [f64; 4],
-    ) -> (Answer<A::Output>, u32) {
-        let mut corners = corners.map_or_else(|| self.sample_corners(&place), |c| *c);
-        loop {
-            match self.verdict(&place, &corners) {
-                Verdict::Final(kind) => {
-                    return (self.answer(&place, &Leaf::new(kind, corners, 0), stuv), place.depth);
-                }
-                Verdict::Split => {
-                    let side = place.side_of::<A::Real>(&stuv);
-                    let [lower, upper] = self.split(&place, &corners);
-                    corners = if side == 0 { lower } else { upper };
-                    place = place.half(side);
-                    self.counters.transient();
-                }
-            }
-        }
-    }
-
-    fn answer(&self, place: &Place, leaf: &Leaf<A::Output>, stuv: [f64; 4]) -> Answer<A::Output> {
-        let corners = leaf.corners();
-        match leaf.kind() {
+    ) -> Answer<A::Output> {
+        match kind {
             Kind::Empty => Answer::Interpolated(corners[0].clone()),
             Kind::Smooth => {
                 let fractions = place.cell.fractions(&stuv.map(A::Real::of));

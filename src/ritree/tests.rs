@@ -1,5 +1,7 @@
 //! The tree against attributes whose answers are known in closed form.
 
+mod keeping;
+
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -125,6 +127,7 @@ fn samples_at_the_corners_of_cells_are_exact() {
         let error = interpolated(tree.query(point, &cache)) - tree.attribute().exact(stuv);
         assert!(error.abs() < 1e-12, "{stuv:?}: {error}");
     }
+    tree.check_invariants();
 }
 
 #[test]
@@ -151,6 +154,7 @@ fn beyond_the_deepest_level_no_cell_is_split() {
     let cache = roomy();
     ask_all(&tree, &cache, &points(3, 500));
     assert_eq!(tree.shape().leaves_by_depth.len(), 10);
+    tree.check_invariants();
 }
 
 /// A step across the oblique hyperplane s + t + u + v = 1.7.
@@ -189,7 +193,9 @@ fn lines_of_a_mixed_cell_are_traced_if_their_side_cannot_be_told_cheaply() {
         let tree = RiTree::new(step(can_locate), settings(0.01, 8));
         let cache = roomy();
         let answers = points(5, 3_000).into_iter().map(|point| tree.query(point, &cache));
-        answers.filter(|a| matches!(a, Some(Answer::Trace(_)))).count()
+        let traced = answers.filter(|a| matches!(a, Some(Answer::Trace(_)))).count();
+        tree.check_invariants();
+        traced
     };
     assert!(traced(false) > 2 * traced(true));
 }
@@ -206,6 +212,7 @@ fn more_than_two_classes_and_directions_too_far_apart_are_traced() {
     let cache = roomy();
     let at = |s, t| LinePoint { pair: PlanePair::ALL[0], stuv: [s, t, 0.3, 0.3] };
     assert_eq!(tree.query(at(0.6, 0.6), &cache), Some(Answer::Trace(Reason::Classes)));
+    tree.check_invariants();
 
     let turning = |turns| Test { turns, ..Test::smooth(|[s, ..]| s) };
     let answer = |turns| RiTree::new(turning(turns), settings(0.01, 4)).query(at(0.3, 0.3), &roomy());
@@ -225,6 +232,7 @@ fn corners_that_all_miss_prove_nothing() {
     let tree = RiTree::new(needle, settings(0.01, 16));
     let on_the_needle = LinePoint { pair: PlanePair::ALL[0], stuv: [0.123_456_789, 0.2, 0.3, 0.4] };
     assert_eq!(tree.query(on_the_needle, &roomy()), Some(Answer::Trace(Reason::Guard)));
+    tree.check_invariants();
 }
 
 #[test]
@@ -241,6 +249,7 @@ fn lines_on_the_rim_of_the_range_but_for_rounding_are_the_trees() {
         let point = LinePoint { pair: PlanePair::ALL[0], stuv: [rounded, 0.5, 0.5, 0.5] };
         assert!((interpolated(tree.query(point, &roomy())) - s).abs() < 1e-12);
     }
+    tree.check_invariants();
 }
 
 #[test]
@@ -262,80 +271,4 @@ fn splitting_ends_where_f64_does() {
         assert!((interpolated(tree.query(smooth, &cache)) - 0.2).abs() < 1e-9);
         tree.check_invariants();
     }
-}
-
-fn bits(answer: Option<Answer<Sample>>) -> Option<Result<u64, Reason>> {
-    answer.map(|a| match a {
-        Answer::Interpolated(sample) => Ok(sample.value.to_bits()),
-        Answer::Trace(reason) => Err(reason),
-    })
-}
-
-#[test]
-fn answers_are_the_same_bits_in_any_order_with_any_cache_pruned_or_not() {
-    let grow = || RiTree::new(step(true), settings(0.01, 14));
-    let all = points(6, 3_000);
-    let (tree, cache) = (grow(), roomy());
-    let expected: Vec<_> = all.iter().map(|&point| bits(tree.query(point, &cache))).collect();
-
-    for limit in [0, 300, 20_000, 200_000] {
-        let (mut tree, cache) = (grow(), Cache::new(limit));
-        let mut order: Vec<usize> = (0..all.len()).rev().collect();
-        let middle = order.len() / 2;
-        order.rotate_left(middle);
-        for (count, &i) in order.iter().enumerate() {
-            assert_eq!(bits(tree.query(all[i], &cache)), expected[i], "{limit} bytes, line {i}");
-            assert!(cache.used_bytes() <= limit);
-            if count % 100 == 0 {
-                tree.tick();
-            }
-            if cache.is_full() && count % 50 == 0 {
-                let mut stamps = Vec::new();
-                tree.collect_stamps(&mut stamps);
-                tree.prune(oldest_to_keep(stamps, limit * 3 / 10), &cache);
-                cache.relieved();
-                assert!(cache.used_bytes() <= limit * 3 / 10, "{} of {limit} kept", cache.used_bytes());
-            }
-        }
-        assert_eq!(tree.check_invariants(), cache.used_bytes(), "{limit}");
-    }
-}
-
-#[test]
-fn threads_share_a_tree_and_get_the_same_bits() {
-    let all = points(7, 4_000);
-    let (alone, cache) = (RiTree::new(step(true), settings(0.01, 14)), roomy());
-    let expected: Vec<_> = all.iter().map(|&point| bits(alone.query(point, &cache))).collect();
-
-    let (tree, cache) = (RiTree::new(step(true), settings(0.01, 14)), Cache::new(400_000));
-    std::thread::scope(|scope| {
-        for thread in 0..8 {
-            let (tree, cache, all, expected) = (&tree, &cache, &all, &expected);
-            scope.spawn(move || {
-                for i in (0..all.len()).map(|i| (i * 7 + thread * 501) % all.len()) {
-                    assert_eq!(bits(tree.query(all[i], cache)), expected[i]);
-                }
-            });
-        }
-    });
-    assert_eq!(tree.check_invariants(), cache.used_bytes());
-}
-
-#[test]
-fn pruning_keeps_what_was_used_last() {
-    let (mut tree, cache) = (RiTree::new(step(true), settings(0.01, 14)), roomy());
-    let (old, new) = (points(8, 200), points(9, 20));
-    ask_all(&tree, &cache, &old);
-    tree.tick();
-    ask_all(&tree, &cache, &new);
-    let mut stamps = Vec::new();
-    tree.collect_stamps(&mut stamps);
-    let newest = stamps.iter().map(|s| s.0).max().expect("leaves");
-    tree.prune(newest, &cache);
-    let leaves = |tree: &RiTree<Test>| tree.shape().leaves_by_depth.iter().sum::<u64>();
-    assert!(leaves(&tree) <= 20);
-    let before = tree.build_counts().nodes_expanded;
-    ask_all(&tree, &cache, &new);
-    assert_eq!(tree.build_counts().nodes_expanded, before, "what was used last is still there");
-    tree.check_invariants();
 }

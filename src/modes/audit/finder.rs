@@ -178,10 +178,11 @@ fn ask_tree(forest: &Forest, organ: usize, body: &Body, rays: &[Segment], answer
     answers.resize(rays.len(), Answer::default());
     let grove = forest.enter();
     let Some(tree) = grove.tree(organ) else { return };
+    let mut descent = tree.descent();
     let bounds = body.bounds();
     let (mut open, mut open_rays) = (Vec::new(), Vec::new());
     for (i, ray) in rays.iter().enumerate() {
-        let known = if holds_box(ray, &bounds) { grove.length_mm(tree, ray).ok() } else { None };
+        let known = if holds_box(ray, &bounds) { grove.length_mm(&mut descent, ray).ok() } else { None };
         match known {
             Some(length_mm) => {
                 answers[i] = Answer { length_mm, found: Found::Interpolated };

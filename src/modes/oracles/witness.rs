@@ -167,7 +167,7 @@ fn interpolate_all(forest: &Forest, body: &Body, rays: &Rays) -> Vec<(usize, Int
 /// The parts of a ray by the body's tree; traced if there is none, or if it says so.
 fn interpolate(grove: &Grove, body: &Body, ray: &Segment, parts: &mut Vec<Interval>) {
     let tree = grove.tree(0).filter(|_| holds_box(ray, &body.bounds()));
-    match tree.map(|tree| grove.chord(tree, ray)) {
+    match tree.map(|tree| grove.chord(&mut tree.descent(), ray)) {
         Some(Ok(chord)) => parts.extend(chord),
         Some(Err(_)) | None => body.chords_of_segment(ray, parts),
     }

@@ -10,7 +10,7 @@ use crate::attributes::squared_chord::{ImageChords, ImageLengths, Known, Squared
 use crate::exact::{Body, Spans};
 use crate::geometry::{Interval, RayGrid, Region, Segment};
 use crate::modes::project::Found;
-use crate::ritree::{Answer, BuildCounts, Cache, FittedTree, Parameters, Reason, RiTree, TreeShape};
+use crate::ritree::{Answer, BuildCounts, Cache, Descent, FittedTree, Parameters, Reason, RiTree, TreeShape};
 
 /// How lengths between samples are found.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -168,6 +168,21 @@ pub struct Forest<'a> {
     clock: AtomicU32,
 }
 
+/// The tree of one organ, asked for one ray after another.
+pub enum OrganDescent<'t, 'a> {
+    Quadrilinear(Descent<'t, ChordLength<'a>>),
+    SquaredChord(&'t FittedTree<SquaredChord<'a>>),
+}
+
+impl<'a> OrganTree<'a> {
+    pub fn descent(&self) -> OrganDescent<'_, 'a> {
+        match self {
+            Self::Quadrilinear(tree) => OrganDescent::Quadrilinear(tree.descent()),
+            Self::SquaredChord(tree) => OrganDescent::SquaredChord(tree),
+        }
+    }
+}
+
 /// Many trees to ask, none of them pruned meanwhile.
 pub struct Grove<'f, 'a> {
     trees: RwLockReadGuard<'f, Vec<OnceLock<OrganTree<'a>>>>,
@@ -284,19 +299,19 @@ impl<'a> Grove<'_, 'a> {
 
     /// The chord of a segment that holds the body's box whole, as the tree of that body knows it. `Err` says why it is
     /// to be traced; `Ok(None)` that it misses. Where a chord lies is known only in a forest that wants places.
-    pub fn chord(&self, tree: &OrganTree, segment: &Segment) -> Result<Option<Interval>, Reason> {
+    pub fn chord(&self, tree: &mut OrganDescent, segment: &Segment) -> Result<Option<Interval>, Reason> {
         let line = segment.line();
         match tree {
-            OrganTree::Quadrilinear(tree) => {
-                let attribute = tree.attribute();
+            OrganDescent::Quadrilinear(descent) => {
+                let attribute = descent.tree().attribute();
                 let point = attribute.space().point_of(line);
-                match tree.query(point, &self.forest.cache) {
+                match descent.query(point, &self.forest.cache) {
                     None | Some(Answer::Interpolated(None)) => Ok(None),
                     Some(Answer::Interpolated(Some(chord))) => Ok(attribute.stretch(chord, line, point)),
                     Some(Answer::Trace(reason)) => Err(reason),
                 }
             }
-            OrganTree::SquaredChord(tree) => {
+            OrganDescent::SquaredChord(tree) => {
                 let chords = tree.fit();
                 let Some((pair, stuv)) = chords.place_of(line) else { return Ok(None) };
                 let chord = |leaf: &_, _| chords.chord(leaf, line, pair, &stuv);
@@ -306,8 +321,8 @@ impl<'a> Grove<'_, 'a> {
     }
 
     /// As [`chord`](Self::chord), its length alone, mm.
-    pub fn length_mm(&self, tree: &OrganTree, segment: &Segment) -> Result<f64, Reason> {
-        let OrganTree::SquaredChord(tree) = tree else {
+    pub fn length_mm(&self, tree: &mut OrganDescent, segment: &Segment) -> Result<f64, Reason> {
+        let OrganDescent::SquaredChord(tree) = tree else {
             return self.chord(tree, segment).map(|chord| chord.map_or(0.0, |chord| chord.length()));
         };
         let (line, chords) = (segment.line(), tree.fit());
@@ -338,9 +353,10 @@ impl<'a> Grove<'_, 'a> {
         mut answer: impl FnMut(usize, Found, Option<Interval>),
     ) {
         let bounds = body.bounds();
+        let mut descent = tree.descent();
         let (mut open, mut open_rays) = (Vec::new(), Vec::new());
         for (i, ray) in rays.iter().enumerate() {
-            match holds_box(ray, &bounds).then(|| self.chord(tree, ray)) {
+            match holds_box(ray, &bounds).then(|| self.chord(&mut descent, ray)) {
                 Some(Ok(chord)) => answer(i, Found::Interpolated, chord),
                 Some(Err(_)) | None => {
                     answer(i, Found::Traced, None);
@@ -377,32 +393,4 @@ pub fn holds_box(segment: &Segment, bounds: &crate::geometry::Bounds) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
-    use glam::DVec3;
-
-    use super::*;
-    use crate::geometry::primitives::icosphere;
-    use crate::geometry::{ClosedMesh, Line, UnitDir};
-
-    #[test]
-    fn trees_share_one_clock_so_that_the_one_asked_last_is_the_newest() {
-        let ball = || Body::new(ClosedMesh::new(icosphere(2)).expect("closed").0);
-        let (often, once) = (ball(), ball());
-        let parameters = Parameters::default();
-        let interpolation = Interpolation::Quadrilinear { parameters };
-        let settings = TreeSettings { interpolation, ..TreeSettings::default() };
-        let forest = Forest::new(vec![&often, &once], settings, false);
-        let line = Line::new(DVec3::ZERO, UnitDir::new(DVec3::new(1.0, 0.2, 0.1)).expect("a direction"));
-        let line = line.expect("finite");
-        let newest = |organ: usize| {
-            let grove = forest.enter();
-            let Some(OrganTree::Quadrilinear(tree)) = grove.tree(organ) else { panic!("no tree") };
-            let _ = tree.query(tree.attribute().space().point_of(&line), &forest.cache);
-            let mut stamps = Vec::new();
-            tree.collect_stamps(&mut stamps);
-            stamps.iter().map(|s| s.0).max().expect("leaves")
-        };
-        let old = (0..50).map(|_| newest(0)).max().expect("asked");
-        assert!(newest(1) > old);
-    }
-}
+mod tests;

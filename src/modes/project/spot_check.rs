@@ -31,7 +31,7 @@ impl Projector<'_> {
                 let Some(tree) = grove.tree(organ).filter(|_| holds_box(&ray, &body.bounds())) else {
                     continue;
                 };
-                let Ok(near) = grove.length_mm(tree, &ray) else { continue };
+                let Ok(near) = grove.length_mm(&mut tree.descent(), &ray) else { continue };
                 let mut length_by = |find: &dyn Fn(&mut Vec<Interval>)| -> f64 {
                     find(&mut parts);
                     parts.iter().map(Interval::length).sum()

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::forest::{Forest, Grove, OrganTree, QueryCounts, holds_box};
+use super::forest::{Forest, Grove, OrganDescent, OrganTree, QueryCounts, holds_box};
 use super::sweep::own_stretches;
 use super::{Found, Projector, RayCounts, Tile};
 use crate::attributes::squared_chord::{ImageChords, ImageLengths, places_of};
@@ -53,7 +53,7 @@ impl TileWork {
     }
 
     /// The tree's answer. `None` if the ray is to be traced.
-    fn ask(&mut self, grove: &Grove, tree: &OrganTree, ray: &Segment) -> Option<Option<Interval>> {
+    fn ask(&mut self, grove: &Grove, tree: &mut OrganDescent, ray: &Segment) -> Option<Option<Interval>> {
         self.queries.queries += 1;
         match grove.chord(tree, ray) {
             Ok(chord) => {
@@ -232,10 +232,11 @@ impl<'a, 's> TileTracer<'a, 's> {
         let body = &self.projector.scene.organs[organ].body;
         let bounds = body.bounds();
         let mut lengths = vec![0.0; rays.len()];
+        let mut descent = tree.descent();
         let (mut open, mut open_rays) = (Vec::new(), Vec::new());
         for (i, ray) in rays.iter().enumerate() {
             let answer = if holds_box(ray, &bounds) {
-                work.ask(grove, tree, ray)
+                work.ask(grove, &mut descent, ray)
             } else {
                 work.queries.traced_source_or_target_inside += 1;
                 None

@@ -1,0 +1,149 @@
+//! One line after another down a tree.
+//!
+//! Lines asked one after another mostly lie in one cell, or in cells near each other. So whoever asks remembers where the last
+//! one ended: the final cell, which often answers the next line as well; and, where the cache had no room, the way down to it,
+//! a few kilobytes, so that what the cells of neighbouring lines have in common is not computed for each. Answers are those
+//! of the cells, whatever is remembered.
+
+use std::sync::atomic::Ordering;
+
+use super::attribute::Attribute;
+use super::cell::{Corners, Place, Verdict};
+use super::node::Leaf;
+use super::{Answer, Cache, Reason, RiTree};
+use crate::linespace::{LinePoint, is_in_range};
+
+/// Asks a tree for one line after another, by one thread.
+pub struct Descent<'t, A: Attribute> {
+    tree: &'t RiTree<A>,
+    /// The last cell of the tree that answered.
+    last: Option<(Place, &'t Leaf<A::Output>)>,
+    /// Cells of the last way down that the cache had no room for, from the highest to a final one.
+    trail: Vec<Step<A::Output>>,
+}
+
+/// A cell that is kept nowhere else.
+struct Step<T> {
+    place: Place,
+    corners: Corners<T>,
+    /// The corners of the other half of the cell above, which cost nothing more.
+    beside: Option<Corners<T>>,
+    verdict: Verdict,
+}
+
+impl<'t, A: Attribute> Descent<'t, A> {
+    pub(super) fn new(tree: &'t RiTree<A>) -> Self {
+        Self { tree, last: None, trail: Vec::new() }
+    }
+
+    /// The tree.
+    pub fn tree(&self) -> &'t RiTree<A> {
+        self.tree
+    }
+
+    /// As [`RiTree::query`].
+    #[inline]
+    pub fn query(&mut self, line: LinePoint, cache: &Cache) -> Option<Answer<A::Output>> {
+        self.query_with_depth(line, cache).map(|(answer, _)| answer)
+    }
+
+    /// As [`RiTree::query_with_depth`].
+    pub fn query_with_depth(&mut self, line: LinePoint, cache: &Cache) -> Option<(Answer<A::Output>, u32)> {
+        let tree = self.tree;
+        let line =
+            if tree.attribute.is_symmetric() && line.pair.is_reversed() { line.reversed() } else { line };
+        if !line.stuv.iter().all(|x| x.is_finite()) {
+            // Overflow on the way to box units says nothing about the line.
+            return Some((Answer::Trace(Reason::Guard), 0));
+        }
+        if !is_in_range(&line.stuv) {
+            return None;
+        }
+        if let Some((place, leaf)) = self.last
+            && place.holds(&line)
+        {
+            return Some(self.answer_by(place, leaf, &line));
+        }
+        if self.trail.first().is_some_and(|step| step.place.holds(&line)) {
+            return Some(self.answer_along_trail(&line));
+        }
+        let mut place = Place::root(line.pair);
+        let Some(mut node) = tree.root(line.pair, cache) else {
+            return Some(self.answer_without_keeping(place, None, &line));
+        };
+        loop {
+            if let Some(leaf) = node.leaf() {
+                self.last = Some((place, leaf));
+                return Some(self.answer_by(place, leaf, &line));
+            }
+            if node.halves().is_none() {
+                match node.expand(&place, tree, cache) {
+                    Ok(()) => continue,
+                    Err(corners) => return Some(self.answer_without_keeping(place, corners, &line)),
+                }
+            }
+            let Some(halves) = node.halves() else { continue };
+            let side = place.side_of::<A::Real>(&line.stuv);
+            (node, place) = (&halves[side], place.half(side));
+        }
+    }
+
+    fn answer_by(&self, place: Place, leaf: &Leaf<A::Output>, line: &LinePoint) -> (Answer<A::Output>, u32) {
+        leaf.touch(self.tree.clock.load(Ordering::Relaxed));
+        (self.tree.answer(&place, leaf.kind(), leaf.corners(), line.stuv), place.depth)
+    }
+
+    /// The same answer, computed below a cell that the cache has no room to expand.
+    fn answer_without_keeping(
+        &mut self,
+        start: Place,
+        corners: Option<Box<Corners<A::Output>>>,
+        line: &LinePoint,
+    ) -> (Answer<A::Output>, u32) {
+        self.trail.clear();
+        let corners = corners.map_or_else(|| self.tree.sample_corners(&start), |corners| *corners);
+        self.push(start, corners, None);
+        self.answer_along_trail(line)
+    }
+
+    /// Of a line in the trail's highest cell.
+    fn answer_along_trail(&mut self, line: &LinePoint) -> (Answer<A::Output>, u32) {
+        let mut at = self.trail.iter().rposition(|step| step.place.holds(line)).unwrap_or(0);
+        loop {
+            let Step { place, corners, verdict, .. } = &self.trail[at];
+            match *verdict {
+                Verdict::Final(kind) => {
+                    return (self.tree.answer(place, kind, corners, line.stuv), place.depth);
+                }
+                Verdict::Split => {
+                    let side = place.side_of::<A::Real>(&line.stuv);
+                    self.turn_to(at, side);
+                    at += 1;
+                }
+            }
+        }
+    }
+
+    /// Makes a half of the cell at `at` the last step.
+    fn turn_to(&mut self, at: usize, side: usize) {
+        let next = if self.trail.len() > at + 1 { Some(self.trail.swap_remove(at + 1)) } else { None };
+        self.trail.truncate(at + 1);
+        let Step { place, corners, .. } = &self.trail[at];
+        let half = place.half(side);
+        match next {
+            // The way led to the other half, whose corners are there.
+            Some(Step { corners, beside: Some(wanted), .. }) => self.push(half, wanted, Some(corners)),
+            _ => {
+                let [lower, upper] = self.tree.split(place, corners);
+                self.tree.counters.transient();
+                let (wanted, other) = if side == 0 { (lower, upper) } else { (upper, lower) };
+                self.push(half, wanted, Some(other));
+            }
+        }
+    }
+
+    fn push(&mut self, place: Place, corners: Corners<A::Output>, beside: Option<Corners<A::Output>>) {
+        let verdict = self.tree.verdict(&place, &corners);
+        self.trail.push(Step { place, corners, beside, verdict });
+    }
+}
