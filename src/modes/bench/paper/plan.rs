@@ -96,6 +96,10 @@ const FEW_DISTANCES: &[f64] = &[0.01, 0.05, 0.15, 0.25];
 const ANGLES: &[f64] = &[5.0, 10.0, 15.0, 20.0, 30.0];
 const DEPTHS: &[f64] = &[22.0, 23.0, 24.0, 25.0, 26.0, 27.0, 28.0, 29.0, 30.0];
 const FEW_DEPTHS: &[f64] = &[22.0, 24.0, 26.0, 28.0, 30.0];
+/// Of three refracting scenes, each of which takes as long as all of a sheet's.
+const VOLUME_ANGLES: &[f64] = &[5.0, 10.0, 20.0, 30.0];
+const VOLUME_DISTANCES: &[f64] = &[0.01, 0.05, 0.25];
+const VOLUME_DEPTHS: &[f64] = &[22.0, 24.0, 26.0, 28.0];
 const ENDS: &[f64] = &[0.05, 0.25];
 
 const fn plan(
@@ -113,7 +117,14 @@ const fn plan(
 /// one of each other input.
 pub const PLANS: [Plan; 12] = [
     plan(Input::BezierSurface, Dial::DistanceThreshold, "Figure 5, Table 2", 0.05, DISTANCES, ENDS),
-    plan(Input::RandomVolumes, Dial::AngularThreshold, "Figure 6, Table 2", 0.25, ANGLES, &[5.0, 30.0]),
+    plan(
+        Input::RandomVolumes,
+        Dial::AngularThreshold,
+        "Figure 6, Table 2",
+        0.25,
+        VOLUME_ANGLES,
+        &[5.0, 30.0],
+    ),
     plan(Input::BezierSurface, Dial::MaxDepth, "Figure 7, Table 2", 0.05, DEPTHS, &[22.0, 24.0, 28.0]),
     Plan {
         share: 0.125,
@@ -127,8 +138,8 @@ pub const PLANS: [Plan; 12] = [
         )
     },
     plan(Input::Tomatoes, Dial::DistanceThreshold, "Table 1", 0.25, ENDS, &[0.25]),
-    plan(Input::RandomVolumes, Dial::DistanceThreshold, "Table 2", 0.25, FEW_DISTANCES, &[]),
-    plan(Input::RandomVolumes, Dial::MaxDepth, "Table 2", 0.25, FEW_DEPTHS, &[]),
+    plan(Input::RandomVolumes, Dial::DistanceThreshold, "Table 2", 0.25, VOLUME_DISTANCES, &[]),
+    plan(Input::RandomVolumes, Dial::MaxDepth, "Table 2", 0.25, VOLUME_DEPTHS, &[]),
     plan(Input::BezierSurface, Dial::AngularThreshold, "Table 2", 0.05, ANGLES, &[]),
     plan(Input::RandomVolumesAbsorption, Dial::DistanceThreshold, "Table 2", 0.25, FEW_DISTANCES, ENDS),
     plan(Input::RandomVolumesAbsorption, Dial::AngularThreshold, "Table 2", 0.25, ANGLES, &[]),
