@@ -9,6 +9,8 @@
 //! The law is the tree's of the paper: what becomes of a cell is a function of the cell, so that no answer depends on the order
 //! of queries, on threads, or on what the cache still holds.
 
+mod kept;
+
 use std::mem::size_of;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -18,6 +20,7 @@ use super::cell::Place;
 use super::stats::{BuildCounters, BuildCounts, TreeShape};
 use crate::linespace::PlanePair;
 use crate::linespace::image::{PlaneForms, Runs};
+pub use kept::KeepableFit;
 
 /// Fits cells. Every method must be a pure function of its arguments.
 pub trait Fit: Sync {

@@ -7,7 +7,7 @@ use super::{ChordLeaf, ChordModel, SquaredChord, quartic};
 use crate::exact::{Record, Way};
 use crate::geometry::Segment;
 use crate::linespace::{LineFrame, squared_span};
-use crate::ritree::{Fit, Fitted, Place, TreeShape};
+use crate::ritree::{Fit, Fitted, KeepableFit, Place, TreeShape};
 
 /// The largest cells are of a level between these: 3/8 to 3/32 of the body's box wide. In larger ones, few lines hit in too
 /// many cells.
@@ -179,7 +179,7 @@ impl Fit for SquaredChord<'_> {
             Some(fit) if !fit.threshold.is_finite() => Some(ChordLeaf::Traced),
             Some(fit) => Some(ChordLeaf::Model(ChordModel {
                 centre: place.cell.centre(),
-                scale: 2.0 / (place.cell.high[0] - place.cell.low[0]),
+                scale: scale_of(place),
                 cubic: fit.cubic,
                 threshold: fit.threshold,
                 middle: fit.middle,
@@ -207,6 +207,27 @@ impl Fit for SquaredChord<'_> {
         };
         shape.count_leaf(depth, number);
     }
+}
+
+impl KeepableFit for SquaredChord<'_> {
+    fn is_sound(&self, leaf: &ChordLeaf, place: &Place) -> bool {
+        let ChordLeaf::Model(model) = leaf else { return true };
+        // Of places within the cell, powers and sums of such coefficients stay finite.
+        let is_small = |x: &f64| x.abs() < 1e100;
+        let ChordModel { centre, scale, cubic, threshold, middle } = model;
+        *centre == place.cell.centre()
+            && *scale == scale_of(place)
+            && cubic.0.iter().all(is_small)
+            && *threshold >= 0.0
+            && is_small(threshold)
+            && middle.is_some() == self.wants_places
+            && middle.iter().flat_map(|middle| &middle.0).all(is_small)
+    }
+}
+
+/// From intercepts about a cell's centre to its local coordinates.
+fn scale_of(place: &Place) -> f64 {
+    2.0 / (place.cell.high[0] - place.cell.low[0])
 }
 
 /// What samples of a cell say.
