@@ -8,12 +8,16 @@
 //! closed, or convex) is its build.
 //!
 //! `cargo bench --bench table -- [--quick] [1280] [20480] [327680] [organs] [600] [2048] [random]`
+//!
+//! `cargo bench --bench table -- choice` prints instead, on one thread, whether the engine taken unasked is the quickest.
 
 use std::io::{Result, Write, stdout};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
+use chordfield::exact::Engine;
 use common::body::{Ellipsoid, SUBDIVISIONS};
+use common::choice::{Choice, each_choice};
 use common::organs::Organs;
 use common::race::{Figures, race, race_of_organs};
 use common::rays::RaySet;
@@ -25,6 +29,9 @@ const SCENES: [&str; 4] = ["1280", "20480", "327680", "organs"];
 
 /// Images by their side, and the batch.
 const RAY_SETS: [&str; 3] = ["600", "2048", "random"];
+
+/// An engine may be chosen that takes this part more time than the quickest.
+const MOST_OVER_BEST: f64 = 1.3;
 
 /// What to run, from the command line.
 struct Options {
@@ -78,6 +85,9 @@ fn main() -> ExitCode {
 /// Prints each table as soon as it is there. Whether all means agree.
 fn print_tables(options: &Options) -> Result<bool> {
     writeln!(stdout(), "{}\nRatios are {YARDSTICK}'s time over the row's.", machine::heading())?;
+    if options.only.iter().any(|only| only == "choice") {
+        return print_choices(options);
+    }
     let mut sound = true;
     for (scene, subdivisions) in SCENES.into_iter().zip(SUBDIVISIONS) {
         let faces = 20 * 4usize.pow(subdivisions);
@@ -174,6 +184,36 @@ fn print_organs(options: &Options) -> Result<bool> {
         }
     }
     Ok(sound)
+}
+
+/// The engine taken unasked beside all that serve. All is well if it takes no more than [`MOST_OVER_BEST`] of the best one's time.
+fn print_choices(options: &Options) -> Result<bool> {
+    writeln!(
+        stdout(),
+        "\n| body | faces | rays | clip, ns | walk | raster | bvh | chosen | over the best |"
+    )?;
+    writeln!(stdout(), "|---|--:|---|--:|--:|--:|--:|---|--:|")?;
+    let (mut sound, mut written) = (true, Ok(()));
+    each_choice(options.rounds(), |choice| {
+        let is_good = choice.over_best() <= MOST_OVER_BEST;
+        sound &= is_good;
+        let time = |engine| match choice.times.iter().find(|of| of.0 == engine) {
+            Some((_, time)) => format!("{:.3}", Significant(*time)),
+            None => "–".to_owned(),
+        };
+        let [clip, walk, raster, bvh] = [Engine::Clip, Engine::Walk, Engine::Raster, Engine::Bvh].map(time);
+        let (Choice { shape, faces, rays, .. }, chosen) = (choice, choice.chosen.name());
+        let verdict = if is_good { "" } else { " **OFF**" };
+        let row = writeln!(
+            stdout(),
+            "| {shape} | {faces} | {rays} | {clip} | {walk} | {raster} | {bvh} | {chosen} | {:.2}{verdict} |",
+            choice.over_best()
+        );
+        if written.is_ok() {
+            written = row;
+        }
+    });
+    written.map(|()| sound)
 }
 
 /// Time in a unit of which a second has `scale`, ratio, and speed-up of two threads.

@@ -4,7 +4,7 @@
 //! share of lengths within the tolerance, and the largest error in tolerances. Trees are built within the time, unless a column
 //! says warm; what a body needs once (its proofs, and the walker's tables) is not in any engine's.
 //!
-//! `cargo bench --bench trees -- [--quick] [20480] [327680] [600] [2048] [orbit] [random] [quadrilinear]`
+//! `cargo bench --bench trees -- [--quick] [20480] [327680] [organs] [600] [2048] [orbit] [random] [quadrilinear] [0.5mm …]`
 
 use std::io::{Result, Write, stdout};
 use std::time::Instant;
@@ -13,8 +13,10 @@ use chordfield::attributes::chord::ChordLength;
 use chordfield::attributes::squared_chord::{ImageChords, Known, SquaredChord};
 use chordfield::exact::{Body, Engine, Lengths};
 use chordfield::geometry::{RayGrid, Segment};
+use chordfield::modes::project::DEFAULT_TOLERANCE_MM;
 use chordfield::ritree::{Answer, Cache, FittedTree, Parameters, RiTree};
 use common::body::Ellipsoid;
+use common::organs::Organs;
 use common::view::{Frame, SOURCE_DISTANCE_MM};
 use common::{machine, random, view};
 use glam::{DQuat, DVec3};
@@ -38,6 +40,13 @@ impl Options {
         let is_named = |name: &str| self.only.iter().any(|only| only == name);
         is_named(name) || !group.iter().any(|name| is_named(name))
     }
+
+    /// The tolerances named, or all.
+    fn tolerances_mm(&self) -> Vec<f64> {
+        let named: Vec<f64> =
+            self.only.iter().filter_map(|only| only.strip_suffix("mm")?.parse().ok()).collect();
+        if named.is_empty() { TOLERANCES_MM.to_vec() } else { named }
+    }
 }
 
 fn main() -> Result<()> {
@@ -45,8 +54,12 @@ fn main() -> Result<()> {
     let options = Options { quick: flags.iter().any(|flag| flag == "--quick"), only };
     let out = &mut stdout().lock();
     writeln!(out, "{}", machine::heading())?;
+    let scenes = ["20480", "327680", "organs"];
+    if options.wants("organs", &scenes) {
+        organs(out, if options.quick { 36 } else { 360 })?;
+    }
     for (faces, subdivisions) in BODIES {
-        if !options.wants(faces, &BODIES.map(|b| b.0)) {
+        if !options.wants(faces, &scenes) {
             continue;
         }
         let body = Body::new(Ellipsoid::BENCH.surface(subdivisions));
@@ -58,24 +71,22 @@ fn main() -> Result<()> {
         )?;
         writeln!(out, "|---|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|")?;
         let all = ["600", "2048", "orbit", "random", "quadrilinear"];
+        let tolerances = &options.tolerances_mm();
         for size in [600, 2048] {
             if options.wants(&size.to_string(), &all) && !(options.quick && size == 2048) {
                 let grid = view::window(body.surface().mesh(), size);
-                views(
-                    out,
-                    &format!("{size}²"),
-                    &body,
-                    &[grid],
-                    options.wants("quadrilinear", &all) && size == 600,
-                )?;
+                views(out, &format!("{size}²"), &body, &[grid], tolerances)?;
             }
+        }
+        if options.wants("quadrilinear", &all) {
+            quadrilinear(out, "600²", &body, &view::window(body.surface().mesh(), 600))?;
         }
         if options.wants("orbit", &all) {
             let count = if options.quick { 36 } else { 360 };
-            views(out, &format!("{count} × 512²"), &body, &orbit(&body, count), false)?;
+            views(out, &format!("{count} × 512²"), &body, &orbit(&body, count), tolerances)?;
         }
         if options.wants("random", &all) {
-            random_rays(out, &body, if options.quick { 1_000_000 } else { 10_000_000 })?;
+            random_rays(out, &body, if options.quick { 1_000_000 } else { 10_000_000 }, tolerances)?;
         }
     }
     Ok(())
@@ -135,14 +146,20 @@ impl Errors {
     }
 }
 
-fn views(out: &mut impl Write, name: &str, body: &Body, grids: &[RayGrid], paper: bool) -> Result<()> {
+fn views(
+    out: &mut impl Write,
+    name: &str,
+    body: &Body,
+    grids: &[RayGrid],
+    tolerances_mm: &[f64],
+) -> Result<()> {
     let pixels = grids[0].whole().pixels();
     let rounds = if grids.len() > 1 { 1 } else { ROUNDS };
     let raster = |grid: &RayGrid, lengths: &mut [f64]| {
         lengths.fill(0.0);
         body.view(grid, Some(Engine::Raster)).trace(&grid.whole(), &mut Lengths(lengths));
     };
-    for tolerance in TOLERANCES_MM {
+    for &tolerance in tolerances_mm {
         let (mut exact, mut lengths) = (vec![0.0; pixels], vec![0.0; pixels]);
         let (mut exact_s, mut cold_s, mut warm_s) = (Vec::new(), Vec::new(), Vec::new());
         let (mut errors, mut traced, mut tree) = (Errors::default(), 0, None);
@@ -195,10 +212,37 @@ fn views(out: &mut impl Write, name: &str, body: &Body, grids: &[RayGrid], paper
         )?;
         out.flush()?;
     }
-    if paper {
-        quadrilinear(out, name, body, &grids[0])?;
-    }
     Ok(())
+}
+
+/// Twenty organs on an orbit at the tolerance that nobody need name: what their trees hold.
+fn organs(out: &mut impl Write, views: u32) -> Result<()> {
+    let organs = Organs::new(512);
+    let bodies: Vec<Body> = organs.surfaces.iter().cloned().map(Body::new).collect();
+    let cache = Cache::new(ROOMY);
+    let new = |body| FittedTree::new(SquaredChord::new(body, DEFAULT_TOLERANCE_MM, false).expect("convex"));
+    let trees: Vec<_> = bodies.iter().map(new).collect();
+    let mut lengths = vec![0.0; organs.grid.whole().pixels()];
+    let mut runs = Vec::new();
+    let mut orbit_s = || {
+        seconds(|| {
+            for grid in organs.orbit(views) {
+                for tree in &trees {
+                    runs.clear();
+                    let image = ImageChords::new(tree.fit(), &grid).expect("the source is outside");
+                    image.trace(tree, &grid.whole(), &cache, &mut lengths, &mut runs);
+                }
+            }
+        })
+    };
+    let (cold_s, warm_s) = (orbit_s(), orbit_s());
+    let megabytes: f64 = trees.iter().map(tree_megabytes).sum();
+    writeln!(
+        out,
+        "\n{} organs of {} faces, {views} views of 512², {DEFAULT_TOLERANCE_MM} mm: {megabytes:.1} MB of trees; cold {cold_s:.2} s, warm {warm_s:.2} s",
+        bodies.len(),
+        bodies[0].surface().mesh().faces.len(),
+    )
 }
 
 fn tree_megabytes(tree: &FittedTree<SquaredChord>) -> f64 {
@@ -272,11 +316,11 @@ fn find_by(
 }
 
 /// Rays in no order, in batches.
-fn random_rays(out: &mut impl Write, body: &Body, count: usize) -> Result<()> {
+fn random_rays(out: &mut impl Write, body: &Body, count: usize, tolerances_mm: &[f64]) -> Result<()> {
     let rays = random::rays(count);
     let mut exact = vec![0.0; count];
     let walk_s = seconds(|| body.trace(Engine::Walk, 0, &rays, &mut Lengths(&mut exact)));
-    for tolerance in TOLERANCES_MM {
+    for &tolerance in tolerances_mm {
         let tree = FittedTree::new(SquaredChord::new(body, tolerance, false).expect("convex"));
         let cache = Cache::new(ROOMY);
         let mut lengths = vec![0.0; count];

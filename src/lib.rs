@@ -37,6 +37,7 @@
 
 pub mod attributes;
 pub mod cli;
+mod dispatch;
 pub mod error;
 pub mod exact;
 pub mod geometry;

@@ -51,36 +51,80 @@ fn a_curve_is_a_page_plots_and_figures_with_a_recommendation() {
 }
 
 #[test]
+fn the_papers_figures_are_a_page_plots_and_tables_beside_its_own() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let args = ["bench", "paper", "--quick", "--scale", "0.004", "--scenes", "tomatoes,adult", "-o", "p"];
+    let output = run(folder.path(), &args);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let table = String::from_utf8_lossy(&output.stdout);
+    assert!(table.contains("Tomatoes: distance threshold (Table 1)") && table.contains("(2.650)"), "{table}");
+
+    let report = json(&folder.path().join("p/paper.json"));
+    assert_eq!((&report["complete"], &report["quick"]), (&true.into(), &true.into()));
+    let sweeps = report["sweeps"].as_array().expect("sweeps");
+    assert_eq!(sweeps.len(), 2, "thresholds of the tomatoes and of the phantom");
+    let rows = sweeps[0]["rows"].as_array().expect("rows");
+    assert!(rows.iter().all(|row| row["flop_speed_up"].as_f64().is_some_and(|s| s > 0.0)), "{rows:?}");
+    assert_eq!(rows[0]["published"]["cpu_speed_up"], 1.89);
+    assert!(sweeps[1]["verdict"]["sentence"].as_str().is_some_and(|words| words.contains("direction is")));
+
+    let csv = std::fs::read_to_string(folder.path().join("p/paper.csv")).expect("a table");
+    let columns: Vec<usize> = csv.lines().map(|line| line.split(',').count()).collect();
+    assert!(columns.len() == 1 + 1 + 2 && columns.iter().all(|n| *n == columns[0]), "{columns:?}");
+    let page = std::fs::read_to_string(folder.path().join("p/paper.html")).expect("a page");
+    assert!(page.contains("<svg") && !page.contains("NaN") && !page.contains("src=\"http"));
+    let plot = folder.path().join("p/paper-adult-distance-speed-up.svg");
+    assert!(std::fs::read_to_string(plot).expect("a plot").starts_with("<svg xmlns"));
+}
+
+#[test]
 fn what_cannot_be_measured_is_refused_and_nothing_is_written() {
     let folder = tempfile::tempdir().expect("a folder");
     for args in [
         &["bench", "curve", "missing.toml", "-o", "b"][..],
         &["bench", "curve", "calibration", "--limit-s", "nan", "-o", "b"],
         &["bench", "curve", "calibration", "--sizes", "0x4", "-o", "b"],
+        &["bench", "paper", "--scale", "0", "-o", "b"],
+        &["bench", "paper", "--rounds", "1", "-o", "b"],
+        &["bench", "paper", "--scenes", "teapot", "-o", "b"],
     ] {
         assert_eq!(run(folder.path(), args).status.code(), Some(2), "{args:?}");
         assert!(!folder.path().join("b").exists(), "{args:?}");
     }
 }
 
+#[test]
+fn one_study_of_scale_may_be_run_alone() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let args = ["bench", "scale", "--studies", "cache", "--quick", "--json"];
+    let output = run(folder.path(), &args);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let studies = report["studies"].as_array().expect("studies");
+    assert_eq!((studies.len(), &studies[0]["name"]), (1, &"cache, kB".into()));
+    assert_eq!(run(folder.path(), &["bench", "scale", "--studies", "giraffes"]).status.code(), Some(2));
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupted_study_leaves_a_whole_report_that_says_so() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let mut child = chordfield(folder.path(), &["bench", "scale", "-q", "-o", "s"])
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .expect("the program starts");
-    // The folder appears when work begins; by then the signal is handled.
-    while !folder.path().join("s").exists() && child.try_wait().expect("a status").is_none() {
-        std::thread::sleep(std::time::Duration::from_millis(10));
+    for name in ["scale", "paper"] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut child = chordfield(folder.path(), &["bench", name, "-q", "-o", "s"])
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the program starts");
+        // The folder appears when work begins; by then the signal is handled.
+        while !folder.path().join("s").exists() && child.try_wait().expect("a status").is_none() {
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+        let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
+        assert!(killed.success());
+        assert_eq!(child.wait().expect("an end").code(), Some(130));
+        let report = json(&folder.path().join(format!("s/{name}.json")));
+        assert_eq!(report["complete"], false);
+        let page = std::fs::read_to_string(folder.path().join(format!("s/{name}.html"))).expect("a page");
+        assert!(page.contains("Interrupted") && page.ends_with("</html>\n"));
     }
-    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
-    assert!(killed.success());
-    assert_eq!(child.wait().expect("an end").code(), Some(130));
-    let report = json(&folder.path().join("s/scale.json"));
-    assert_eq!(report["complete"], false);
-    let page = std::fs::read_to_string(folder.path().join("s/scale.html")).expect("a page");
-    assert!(page.contains("Interrupted") && page.ends_with("</html>\n"));
 }

@@ -17,6 +17,7 @@ const SIGNALS: [(&str, i32); 2] = [("-INT", 130), ("-TERM", 143)];
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("balls.toml"), nested_balls(64)).expect("a scene");
+    std::fs::write(folder.path().join("study.toml"), STUDY).expect("a study");
     folder
 }
 
@@ -79,6 +80,12 @@ fn stop(args: &[&str], after: u64, look: impl Fn(&Path)) {
     }
 }
 
+fn assert_nothing_new(folder: &Path) {
+    let mut left = files(folder);
+    left.sort();
+    assert_eq!(left, ["balls.toml", "study.toml"].map(|name| folder.join(name)));
+}
+
 fn assert_no_record(folder: &Path) {
     let left = files(&folder.join("out"));
     assert!(!left.iter().any(|file| file.extension().is_some_and(|e| e == "json")), "{left:?}");
@@ -104,7 +111,7 @@ fn audits_stopped_write_nothing() {
     let lines = ["audit", "balls.toml", "--rays", "1e10", "-o", "out"];
     let aimed = ["audit", "balls.toml", "--adversarial", "1e9"];
     for args in [&views[..], &lines, &aimed] {
-        stop(args, 200, |folder| assert_eq!(files(folder), [folder.join("balls.toml")]));
+        stop(args, 200, |folder| assert_nothing_new(folder));
     }
 }
 
@@ -112,9 +119,35 @@ fn audits_stopped_write_nothing() {
 fn oracles_sweeps_benchmarks_and_checks_are_stopped_at_once() {
     let (oracles, stress) = (["audit", "adult", "--oracles"], ["audit", "balls.toml", "--stress", "1e9"]);
     for args in [&oracles[..], &stress, &["bench", "curve", "balls.toml"]] {
-        stop(args, 200, |folder| assert_eq!(files(folder), [folder.join("balls.toml")]));
+        stop(args, 200, |folder| assert_nothing_new(folder));
     }
     stop(&["check", "adult", "adult", "adult", "adult", "adult", "adult"], 50, |_| {});
+}
+
+/// A hundred million paths through the balls.
+const STUDY: &str = "scene = \"balls.toml\"
+paths = { field = { rectangle_mm = [80, 80], spacing_mm = 0.08 } }
+beam = { control_points = [{ gantry_deg = \"0..360:3.6\" }] }
+";
+
+#[test]
+fn studies_stopped_leave_no_table_and_no_record() {
+    for more in
+        [&["--method", "exact"][..], &["--method", "ritree"], &["--shard", "1/2"], &["--write", "none"]]
+    {
+        let args = [&["dose", "study.toml", "--json"], more].concat();
+        stop(&args, 300, |folder| assert_eq!(files(&folder.join("out")), [] as [PathBuf; 0], "{args:?}"));
+    }
+}
+
+#[test]
+fn pictures_stopped_are_not_there() {
+    let scene = ["trace", "random-volumes", "--seed", "2", "--size", "3000x3000", "--json"];
+    for more in [&["--method", "exact"][..], &["--method", "ritree"], &["--compare"], &["--count-operations"]]
+    {
+        let args = [&scene[..], more].concat();
+        stop(&args, 300, |folder| assert_eq!(files(&folder.join("out")), [] as [PathBuf; 0], "{args:?}"));
+    }
 }
 
 #[test]
@@ -254,7 +287,20 @@ fn a_mesh_that_is_gone_is_named() {
         "mesh = { file = \"gone.obj\" }",
     );
     std::fs::write(folder.path().join("gone.toml"), scene).expect("a scene");
-    for args in [["project", "gone.toml"], ["audit", "gone.toml"]] {
+    let study = "scene = \"gone.toml\"\npaths = { points = [{ at_mm = [0, 0, 0] }] }\n";
+    std::fs::write(folder.path().join("gone-study.toml"), study).expect("a study");
+    let world = "sky = { radius = 900, colours = [\"#000000\", \"#ffffff\"] }
+        cameras = [{ eye = [0, -60, 0], target = [0, 0, 0] }]
+        [[object]]
+        name = \"mesh\"
+        shape = { kind = \"mesh\", file = \"gone.obj\" }\n";
+    std::fs::write(folder.path().join("gone-world.toml"), world).expect("a scene");
+    for args in [
+        ["project", "gone.toml"],
+        ["audit", "gone.toml"],
+        ["dose", "gone-study.toml"],
+        ["trace", "gone-world.toml"],
+    ] {
         let run = start(folder.path(), &args).wait_with_output().expect("it ends");
         assert_eq!(run.status.code(), Some(2), "{}", err(&run));
         assert!(err(&run).contains("gone.obj") && err(&run).contains("No such file"), "{}", err(&run));

@@ -1,7 +1,10 @@
-//! The same bits everywhere: by every engine's image, for any number of threads, however the program was optimised.
+//! The same bits everywhere: by every engine's image, for any number of threads, with the widest instructions of the machine
+//! and with those of every machine, however the program was optimised.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
 mod common;
+
+use std::process::Command;
 
 use chordfield::exact::Engine;
 use chordfield::modes::Control;
@@ -54,6 +57,7 @@ fn hash_of_images(name: &str) -> u64 {
     hash
 }
 
+/// With the instructions that the environment allows: the test below runs this one.
 #[test]
 fn images_are_the_golden_bits_for_one_two_and_eight_threads() {
     for threads in [1, 2, 8] {
@@ -61,4 +65,40 @@ fn images_are_the_golden_bits_for_one_two_and_eight_threads() {
         let found = GOLDEN.map(|(name, _)| (name, pool.install(|| hash_of_images(name))));
         assert_eq!(found, GOLDEN, "{threads} threads: {found:#018x?}");
     }
+}
+
+#[test]
+fn images_are_the_golden_bits_with_wide_instructions_and_without() {
+    for dispatch in ["baseline", "auto"] {
+        let run = Command::new(std::env::current_exe().expect("this test"))
+            .args(["--exact", "images_are_the_golden_bits_for_one_two_and_eight_threads"])
+            .env("CHORDFIELD_DISPATCH", dispatch)
+            .output()
+            .expect("this test starts");
+        let said = String::from_utf8_lossy(&run.stdout);
+        assert!(run.status.success() && said.contains("1 passed"), "{dispatch}: {said}");
+    }
+}
+
+#[test]
+fn the_program_writes_the_same_image_either_way_and_refuses_words_that_mean_neither() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("balls.toml"), nested_balls(48)).expect("a scene");
+    let run = |dispatch: &str| {
+        Command::new(env!("CARGO_BIN_EXE_chordfield"))
+            .current_dir(folder.path())
+            .args(["project", "balls.toml", "--write", "p", "-o", dispatch])
+            .env("CHORDFIELD_DISPATCH", dispatch)
+            .output()
+            .expect("the program starts")
+    };
+    let images = ["baseline", "auto"].map(|dispatch| {
+        assert_eq!(run(dispatch).status.code(), Some(0), "{dispatch}");
+        std::fs::read(folder.path().join(dispatch).join("balls-g000-p.mha")).expect("an image")
+    });
+    assert!(images[0] == images[1]);
+    let refused = run("avx");
+    assert_eq!(refused.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&refused.stderr);
+    assert!(said.contains("CHORDFIELD_DISPATCH") && said.contains("`baseline` or `auto`"), "{said}");
 }

@@ -22,7 +22,8 @@ impl OneEngine {
         match engine {
             Engine::Walk => drop(black_box(body.walker())),
             Engine::Bvh => drop(black_box(body.bvh())),
-            Engine::Clip | Engine::Raster => {}
+            Engine::Raster => drop(black_box(body.patches())),
+            Engine::Clip => {}
         }
         Self { body, engine }
     }

@@ -8,6 +8,7 @@
 //! Engines of this crate enter in [`engines`], other crates in [`rivals`]; a row of the table is a line in [`field()`].
 
 pub mod body;
+pub mod choice;
 pub mod engines;
 pub mod machine;
 pub mod organs;

@@ -1,7 +1,7 @@
 //! Twenty organs in one picture: an ellipsoid in each cell of a 5 × 4 lattice, side by side across the beam.
 
 use chordfield::geometry::{ClosedMesh, RayGrid, Region, TriMesh};
-use glam::DVec2;
+use glam::{DQuat, DVec2};
 
 use crate::body::{Ellipsoid, HALF_AXES_MM, closed};
 use crate::view::{Frame, SOURCE_AWAY};
@@ -46,6 +46,16 @@ impl Organs {
         let frame = Frame::along(source, right);
         let grid = frame.window(&meshes, size);
         Self { surfaces: meshes.into_iter().map(closed).collect(), grid, frame }
+    }
+
+    /// Views of the lattice from all around it, of as many rays.
+    pub fn orbit(&self, views: u32) -> impl Iterator<Item = RayGrid> + '_ {
+        let (axis, _) = SOURCE_AWAY.any_orthonormal_pair();
+        (0..views).map(move |i| {
+            let turn = DQuat::from_axis_angle(axis, std::f64::consts::TAU * f64::from(i) / f64::from(views));
+            let frame = Frame::along(turn * (SOURCE_DISTANCE_MM * SOURCE_AWAY), axis);
+            frame.window(self.surfaces.iter().map(ClosedMesh::mesh), self.grid.size().0)
+        })
     }
 
     /// The rectangle of pixels outside which no ray meets an organ: that of its box's corners.

@@ -3,5 +3,6 @@
 pub mod chord;
 pub mod exit_ray;
 pub mod lines;
+pub mod smooth_chord;
 pub mod squared_chord;
 pub mod surface;

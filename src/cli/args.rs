@@ -12,7 +12,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use crate::output::png::Polarity;
 use crate::physics::DetectorResponse;
 pub use audit::{AuditArgs, RayArgs};
-pub use bench::{BenchCommand, ChoiceArgs, CurveArgs, RunArgs, ScaleArgs};
+pub use bench::{BenchCommand, ChoiceArgs, CurveArgs, PaperArgs, RunArgs, ScaleArgs};
 pub use dose::{DoseArgs, FormatArg, TableArg};
 pub use trace::TraceArgs;
 

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::args::{BenchCommand, ChoiceArgs, CurveArgs, RunArgs, ScaleArgs, SourceArgs};
+use super::args::{BenchCommand, ChoiceArgs, CurveArgs, PaperArgs, RunArgs, ScaleArgs, SourceArgs};
 use super::project::{change, open};
 use super::{Session, command_line, print};
 use crate::error::{Error, Result};
@@ -13,6 +13,7 @@ use crate::modes::Control;
 use crate::modes::bench::Patience;
 use crate::modes::bench::choice::{self, ChoiceSettings};
 use crate::modes::bench::curve::{self, CurveSettings};
+use crate::modes::bench::paper::{self, PaperSettings};
 use crate::modes::bench::scale::{self, ScaleSettings};
 use crate::output::{bench as output, create_folder, json};
 
@@ -25,6 +26,9 @@ const HURRY: Patience = Patience { rounds: 3, seconds: 0.5 };
 /// Sizes in a hurry are no larger than this, columns times rows.
 const SMALL: u64 = 600 * 600;
 
+/// Sides of the paper's pictures in a hurry, as a share.
+const QUICK_SCALE: f64 = 0.1;
+
 /// Measures, writes the report if a folder is named, and says its sum on `out`. What was measured before an interruption is
 /// written and said, too.
 ///
@@ -35,6 +39,7 @@ pub fn run(command: &BenchCommand, session: &Session, out: &mut dyn Write) -> Re
         BenchCommand::Curve(args) => run_curve(args, session, out),
         BenchCommand::Scale(args) => run_scale(args, session, out),
         BenchCommand::Choice(args) => run_choice(args, session, out),
+        BenchCommand::Paper(args) => run_paper(args, session, out),
     }
 }
 
@@ -70,7 +75,8 @@ fn run_curve(args: &CurveArgs, session: &Session, out: &mut dyn Write) -> Result
 }
 
 fn run_scale(args: &ScaleArgs, session: &Session, out: &mut dyn Write) -> Result<()> {
-    let settings = ScaleSettings { patience: patience(&args.run), quick: args.run.quick };
+    let settings =
+        ScaleSettings { patience: patience(&args.run), quick: args.run.quick, studies: args.studies.clone() };
     let mut report = measure(session, &args.run, scale::turns(&settings), "scale", |control| {
         scale::scale(&settings, control)
     })?;
@@ -91,6 +97,21 @@ fn run_choice(args: &ChoiceArgs, session: &Session, out: &mut dyn Write) -> Resu
     })?;
     report.command = command_line();
     finish(&args.run, &report, report.complete, output::write_choice, output::choice_table, out)
+}
+
+fn run_paper(args: &PaperArgs, session: &Session, out: &mut dyn Write) -> Result<()> {
+    let settings = PaperSettings {
+        inputs: args.scenes.clone(),
+        patience: patience(&args.run),
+        quick: args.run.quick,
+        scale: args.scale.unwrap_or(if args.run.quick { QUICK_SCALE } else { 1.0 }),
+    };
+    settings.check()?;
+    let mut report = measure(session, &args.run, paper::turns(&settings), "paper", |control| {
+        paper::paper(&settings, control)
+    })?;
+    report.command = command_line();
+    finish(&args.run, &report, report.complete, output::write_paper, output::paper_table, out)
 }
 
 fn patience(args: &RunArgs) -> Patience {

@@ -26,6 +26,7 @@ pub use session::Session;
 /// # Errors
 /// What stopped the command. A refusal by `check` is [`Refused`](Outcome::Refused), not an error.
 pub fn run(cli: &Cli, session: &Session, out: &mut dyn Write) -> Result<Outcome> {
+    crate::dispatch::check()?;
     match &cli.command {
         Command::Project(args) => project::run(args, session, out).map(|()| Outcome::Done),
         Command::Audit(args) => audit::run(args, session, out),

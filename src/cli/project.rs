@@ -71,10 +71,11 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
         records.push((view, label.clone(), files));
     }
     bar.finish_and_clear();
-    let ritree = tree_summary(&projector, method, queries, &views);
-    stages.end("check");
+    // Before the check below asks for leaves of its own.
     keep::save(&args.keep, &projector, session)?;
     stages.end("write");
+    let ritree = tree_summary(&projector, method, queries, &views);
+    stages.end("check");
 
     let choices = choices(&scene, &projector);
     let files = records.iter().flat_map(|(_, _, files)| files);

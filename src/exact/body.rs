@@ -2,18 +2,24 @@
 
 use std::sync::OnceLock;
 
+use glam::{DMat3, DVec3};
+
 use super::Engine;
 use super::Record;
 use super::bvh::Bvh;
 use super::clip::ConvexClipper;
+use super::raster::Patches;
 use super::walk::{Unsure, Walker};
-use crate::geometry::{Bounds, ClosedMesh, ConvexMesh, Interval, Line, NotConvex, RayGrid, Region, Segment};
+use crate::geometry::{
+    Bounds, ClosedMesh, ConvexMesh, Interval, Line, NotConvex, RayGrid, Region, Segment, ball_of_inertia,
+};
 
 /// A closed body, ready for exact chords. What an engine needs beyond the surface is made when the engine is first used.
 #[derive(Clone, Debug)]
 pub struct Body {
     form: Form,
     bvh: OnceLock<Bvh>,
+    patches: OnceLock<Patches>,
 }
 
 #[derive(Clone, Debug)]
@@ -43,7 +49,7 @@ impl Body {
                 Form::General { surface, why }
             }
         };
-        Self { form, bvh: OnceLock::new() }
+        Self { form, bvh: OnceLock::new(), patches: OnceLock::new() }
     }
 
     /// Its surface.
@@ -83,14 +89,28 @@ impl Body {
         }
     }
 
+    /// A point in the middle of the body, mm, and the linear map from mm about it to a frame in which the body is about a
+    /// ball of radius 1: its ellipsoid of inertia becomes that ball.
+    pub fn ball_frame(&self) -> (DVec3, DMat3) {
+        match self.walker() {
+            Some(walker) => walker.ball_frame(),
+            None => ball_of_inertia(self.surface().mesh().triangles(), self.bounds()),
+        }
+    }
+
     /// The hierarchy over its faces.
     pub fn bvh(&self) -> &Bvh {
         self.bvh.get_or_init(|| Bvh::new(self.surface()))
     }
 
+    /// Its faces in patches, for the raster.
+    pub fn patches(&self) -> &Patches {
+        self.patches.get_or_init(|| Patches::new(self.surface()))
+    }
+
     /// Forgets what engines have made ready; the next to be used makes it again. For measuring what that costs.
     pub fn forget_engines(&mut self) {
-        self.bvh = OnceLock::new();
+        (self.bvh, self.patches) = (OnceLock::new(), OnceLock::new());
         if let Form::Convex(convex) = &mut self.form {
             convex.walker = OnceLock::new();
         }

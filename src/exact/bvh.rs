@@ -65,14 +65,14 @@ impl Bvh {
         segments: &[Segment],
         record: &mut impl Record,
     ) {
-        pulp::Arch::new().dispatch(Trace { bvh: self, surface, first_ray, segments, record });
+        crate::dispatch::arch().dispatch(Trace { bvh: self, surface, first_ray, segments, record });
     }
 
     /// Finds the parts of `line` inside `surface`, mm along `dir`, in order and disjoint; written to `found`. As exact as
     /// [`trace`](Self::trace).
     pub fn chords(&self, surface: &ClosedMesh, line: &Line, found: &mut Vec<Interval>) {
         let mut parts = Parts::default();
-        pulp::Arch::new().dispatch(Cross { bvh: self, surface, line, parts: &mut parts });
+        crate::dispatch::arch().dispatch(Cross { bvh: self, surface, line, parts: &mut parts });
         found.clear();
         found.extend(parts.intervals());
     }
@@ -187,14 +187,23 @@ impl WithSimd for Cross<'_> {
 /// As [`Bvh::chords`], for a line on its own through a surface that has no [`Bvh`]: by the surface's own tree, one box and one
 /// face at a time.
 pub fn chords(surface: &ClosedMesh, line: &Line, found: &mut Vec<Interval>) {
+    found.clear();
+    found.extend(parts_of(surface, line).intervals());
+}
+
+/// As [`Bvh::trace`], likewise.
+pub fn trace(surface: &ClosedMesh, ray: usize, segment: &Segment, record: &mut impl Record) {
+    parts_of(surface, segment.line()).report(ray, &segment.reach(), record);
+}
+
+fn parts_of(surface: &ClosedMesh, line: &Line) -> Parts {
     let mut parts = Parts::default();
     let shear = Shear::new(line);
     let near_line = LineBoxTest::new(line);
     surface
         .tree()
         .visit(|b| near_line.may_hit(b), |face| parts.add(face, Crossing::of(surface, face, &shear)));
-    found.clear();
-    found.extend(parts.intervals());
+    parts
 }
 
 #[cfg(test)]

@@ -73,7 +73,7 @@ impl ConvexClipper {
     /// Records where each segment, numbered from `first`, enters and leaves the body, mm from its source. The faces are
     /// those of the planes that decide; where planes meet on the ray, the first of them.
     pub fn trace_all<R: Record>(&self, first: usize, segments: &[Segment], record: &mut R) {
-        pulp::Arch::new().dispatch(Trace { clipper: self, first, segments, record });
+        crate::dispatch::arch().dispatch(Trace { clipper: self, first, segments, record });
     }
 
     /// As [`trace_all`](Self::trace_all), for one segment.

@@ -1,6 +1,6 @@
 //! Which engine serves when.
 
-use super::raster::RasterView;
+use super::raster::{self, RasterView};
 use super::{Body, Record};
 use crate::geometry::{RayGrid, Region};
 
@@ -22,17 +22,36 @@ pub enum Engine {
 /// to 200 ns for a walk between random rays over bodies of 80 and 320 faces, and some 300 ns for a descent.
 pub(super) const FEW_PLANES: usize = 100;
 
-/// Costs of one thread, in nanoseconds, by which engines are chosen for an image: measured (`cargo bench --bench table` in `benches`), on ellipsoids of a
-/// thousand to a third of a million faces. Only their ratios matter.
+/// Costs of one thread, in nanoseconds, by which engines are chosen for an image: measured (`cargo bench --bench table -- choice`
+/// in `benches`), on bodies of eighty to a third of a million faces. Only their ratios matter.
 mod cost {
-    /// To project a face and to find the pixels it covers.
-    pub const RASTER_FACE: f64 = 70.0;
-    /// To add its crossings to them, for each pixel of the image.
-    pub const RASTER_PIXEL: f64 = 5.0;
-    /// A walk from the neighbouring pixel: half of that over a thousand faces, twice over a third of a million.
-    pub const WALK_PIXEL: f64 = 100.0;
+    /// To place a face and to find the pixels it covers.
+    pub const RASTER_FACE: f64 = 40.0;
+    /// To find lengths from what faces cover, for each pixel of the body's rectangle.
+    pub const RASTER_PIXEL: f64 = 4.0;
+
+    /// A walk from the neighbouring pixel, over so many faces.
+    pub fn walk_pixel(faces: f64) -> f64 {
+        30.0 + 2.0 * faces.cbrt()
+    }
+
     /// A descent of the hierarchy.
-    pub const BVH_PIXEL: f64 = 400.0;
+    pub fn bvh_pixel(faces: f64) -> f64 {
+        150.0 + 7.0 * faces.cbrt()
+    }
+}
+
+/// What an image of a body is estimated to cost, nanoseconds of one thread. Only ratios matter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImageCost {
+    /// The quickest engine.
+    pub engine: Engine,
+    /// All of the image by that engine.
+    pub ns: f64,
+    /// Pixels of the rectangle that the body is seen in.
+    pub pixels: f64,
+    /// One of them by a walk.
+    pub walked_pixel_ns: f64,
 }
 
 impl Engine {
@@ -56,20 +75,23 @@ impl Engine {
 }
 
 impl Body {
-    /// The quickest engine for an image of so many pixels: the raster, unless the image is small for the number of faces.
-    pub fn engine_for_image(&self, pixels: u64) -> Engine {
-        self.cheapest_for_image(pixels).0
+    /// The quickest engine for an image: the raster, unless the body is seen in few pixels for the number of its faces.
+    pub fn engine_for_image(&self, grid: &RayGrid) -> Engine {
+        self.image_cost(grid).engine
     }
 
-    /// As [`engine_for_image`](Self::engine_for_image), with what the engine is estimated to cost, nanoseconds of one thread.
-    pub fn cheapest_for_image(&self, pixels: u64) -> (Engine, f64) {
-        let (pixels, faces) = (pixels as f64, self.surface().mesh().faces.len() as f64);
+    /// What an image is estimated to cost by that engine.
+    pub fn image_cost(&self, grid: &RayGrid) -> ImageCost {
+        let pixels = raster::pixels_around(&self.bounds(), grid) as f64;
+        let faces = self.surface().mesh().faces.len() as f64;
+        let walked_pixel_ns = cost::walk_pixel(faces);
         let raster = faces * cost::RASTER_FACE + pixels * cost::RASTER_PIXEL;
         let (other, cost) = match self.convexity() {
-            Ok(_) => (Engine::Walk, pixels * cost::WALK_PIXEL),
-            Err(_) => (Engine::Bvh, pixels * cost::BVH_PIXEL),
+            Ok(_) => (Engine::Walk, pixels * walked_pixel_ns),
+            Err(_) => (Engine::Bvh, pixels * cost::bvh_pixel(faces)),
         };
-        if cost < raster { (other, cost) } else { (Engine::Raster, raster) }
+        let (engine, ns) = if cost < raster { (other, cost) } else { (Engine::Raster, raster) };
+        ImageCost { engine, ns, pixels, walked_pixel_ns }
     }
 
     /// The quickest engine for rays in no order.
@@ -84,12 +106,11 @@ impl Body {
     /// The body made ready for the rays of a grid: by `engine`, or by the quickest if `None` or if that one does not
     /// [serve](Engine::serves).
     pub fn view(&self, grid: &RayGrid, engine: Option<Engine>) -> BodyView<'_> {
-        let (columns, rows) = grid.size();
-        let quickest = || self.engine_for_image(u64::from(columns) * u64::from(rows));
+        let quickest = || self.engine_for_image(grid);
         let engine = engine.filter(|engine| engine.serves(self)).unwrap_or_else(quickest);
-        let raster = (engine == Engine::Raster).then(|| match self.convexity() {
-            Ok(_) => RasterView::of_convex(self.surface(), grid),
-            Err(_) => RasterView::new(self.surface(), grid),
+        let raster = (engine == Engine::Raster).then(|| {
+            let view = RasterView::of_patches(self.surface(), self.patches(), grid);
+            if self.convexity().is_ok() { view.as_convex() } else { view }
         });
         BodyView { body: self, grid: *grid, engine, raster }
     }

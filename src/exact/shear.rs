@@ -86,6 +86,13 @@ impl Shear {
         [(p.x * x[0] + p.y * y[0]) + p.z * z[0], (p.x * x[1] + p.y * y[1]) + p.z * z[1]]
     }
 
+    /// What a place's products with make its coordinates across, but for where the origin lies.
+    #[inline(always)]
+    pub fn to_across(&self) -> [DVec3; 2] {
+        let [x, y, z] = self.across;
+        [DVec3::new(x[0], y[0], z[0]), DVec3::new(x[1], y[1], z[1])]
+    }
+
     /// Where `vertex` lies along the line, in the direction's length; errs by γ₃ of itself.
     #[inline(always)]
     pub fn along(&self, vertex: DVec3) -> f64 {

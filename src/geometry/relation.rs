@@ -325,6 +325,16 @@ mod tests {
         }
     }
 
+    /// A cube one of whose corners was drawn out through the far side: edges meet edges only.
+    #[test]
+    fn a_surface_drawn_through_itself_along_its_own_edges_is_found() {
+        let mut mesh = cube(2.0);
+        let drawn = mesh.vertices.iter().position(|&v| v == DVec3::new(-1.0, 1.0, 1.0)).expect("a corner");
+        mesh.vertices[drawn].x = 41.0;
+        let (pairs, _) = self_crossing(&closed(mesh)).expect("a crossing");
+        assert!(pairs > 0);
+    }
+
     #[test]
     fn a_surface_drawn_through_itself_is_found() {
         let mut twisted = icosphere(2).map_vertices(|v| 10.0 * v);

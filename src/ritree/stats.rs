@@ -60,6 +60,13 @@ pub struct BuildCounts {
     pub prunes: u64,
 }
 
+impl BuildCounts {
+    /// Cells that were looked at, whether they could be kept or not. Where the cache is too small, the same ones again and again.
+    pub fn cells(&self) -> u64 {
+        self.nodes_expanded + self.transient_splits
+    }
+}
+
 impl std::ops::AddAssign for BuildCounts {
     fn add_assign(&mut self, other: Self) {
         self.samples_taken += other.samples_taken;

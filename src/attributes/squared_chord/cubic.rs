@@ -162,7 +162,7 @@ const PADDED: usize = 36;
 
 impl Normal {
     fn of<'t>(rows: impl Iterator<Item = (&'t [f64; TERMS], f64)>) -> Self {
-        pulp::Arch::new().dispatch(Gather(rows))
+        crate::dispatch::arch().dispatch(Gather(rows))
     }
 
     /// Solves the equations of the first `count` terms for a right side. `None` if they do not define a solution.

@@ -1,11 +1,9 @@
 //! What becomes of a cell: a pure function of it.
 
-use glam::DVec3;
-
-use super::cubic::{Cubic, Design, FIT_LINES, Local, TEST_LINES};
-use super::{ChordLeaf, ChordModel, SquaredChord, quartic};
-use crate::exact::{Record, Way};
-use crate::geometry::Segment;
+use super::cubic::{Cubic, Design, FIT_LINES, MORE_LINES, TEST_LINES};
+use super::samples::{Hit, Samples};
+use super::shaft::{Shaft, Sheets};
+use super::{ChordLeaf, ChordModel, SquaredChord};
 use crate::linespace::{LineFrame, squared_span};
 use crate::ritree::{Fit, Fitted, KeepableFit, Place, TreeShape};
 
@@ -35,9 +33,9 @@ const OF_FIT: f64 = 1.5;
 /// What halving a cell divides the error of a cubic by: 2⁴ less what facets and outlines leave.
 const GAIN_OF_SPLIT: f64 = 12.0;
 
-/// A separation below this, in box units, is not believed: far more than rounding, even of a body a thousand times its size
-/// from the origin.
-const LEAST_SEPARATION: f64 = 1e-9;
+/// Cells of bodies that are not convex are split down to this level where lines may cross the surface more or less often:
+/// there, lines are traced along outlines and folds.
+const DEEPEST_OF_GENERAL: u32 = 6;
 
 impl<'a> SquaredChord<'a> {
     /// Looks at a few cells to find the noise of facets, and the largest cells that are worth a fit.
@@ -50,6 +48,12 @@ impl<'a> SquaredChord<'a> {
             let root = Place::root(LineFrame::pair(axis));
             self.look_at(&parts.fold(root, |place, _| place.half(place.side_of::<f64>(&PROBES[axis]))))
         };
+        if !self.is_convex() {
+            let fits = (0..3).filter_map(|axis| look(axis, DEEPEST_OF_GENERAL)?.fit);
+            self.noise = fits.map(|fit| fit.error).reduce(f64::min).unwrap_or(0.0);
+            (self.first_level, self.deepest_level) = (LEVELS.start, DEEPEST_OF_GENERAL);
+            return self;
+        }
         let mut noise = f64::INFINITY;
         // F is spread evenly over lines through a ball, from 0 to about 1 there.
         let mut traced = |level: u32| -> f64 {
@@ -70,7 +74,7 @@ impl<'a> SquaredChord<'a> {
             (level, here) = (level + 1, next);
         }
         self.noise = if noise.is_finite() { noise } else { 0.0 };
-        self.first_level = level;
+        (self.first_level, self.deepest_level) = (level, level + MOST_SPLITS);
         if here > HOPELESS {
             // Nothing would come of fits: one cell says so for all.
             (self.first_level, self.is_hopeless) = (0, true);
@@ -98,7 +102,19 @@ impl<'a> SquaredChord<'a> {
             .then(|| Look { fit: self.fit_of(place, &samples, is_complete), samples: samples.count as u64 })
     }
 
+    /// Whether all samples of a cell go through a body that is not convex equally often, as they do but for rounding; and
+    /// once, if it is asked where.
+    fn is_alike(&self, samples: &Samples) -> bool {
+        let parts = samples.hits[0].parts;
+        samples.misses.is_empty()
+            && samples.hits.iter().all(|hit| hit.parts == parts)
+            && (parts == 1 || !self.wants_places)
+    }
+
     fn fit_of(&self, place: &Place, samples: &Samples, is_complete: bool) -> Option<CellFit> {
+        if !self.is_convex() && !self.is_alike(samples) {
+            return None;
+        }
         let design = Design::get();
         let of_fit = samples.hits.iter().filter(|hit| hit.line < samples.count - TEST_LINES);
         let of_fit: Vec<&Hit> = of_fit.take(FIT_LINES).collect();
@@ -144,14 +160,15 @@ impl<'a> SquaredChord<'a> {
         Some(fit)
     }
 
-    /// Whether no line of the cell meets the body, proved: a plane of the cell's [shaft](crate::linespace::Cell::shaft_planes)
-    /// has the body behind it.
-    fn is_certainly_empty(&self, place: &Place) -> bool {
-        let origin = self.frame.point_mm(DVec3::ZERO);
-        place.cell.shaft_planes(place.pair).any(|(normal, least)| {
-            let n = self.frame.normal_mm(normal);
-            self.body.surface().farthest_vertex(n, origin, least - LEAST_SEPARATION).is_none()
-        })
+    /// What becomes of a cell of a body that is not convex: `None` if it is to be sampled.
+    fn without_samples(&self, place: &Place) -> Option<Fitted<ChordLeaf>> {
+        let leaf = match Shaft::new(&self.frame, place, self.body.surface()).sheets() {
+            Sheets::Constant => return None,
+            Sheets::None => Some(ChordLeaf::Empty),
+            Sheets::Unknown if place.depth / 4 < self.deepest_level => None,
+            Sheets::Unknown => Some(ChordLeaf::Traced),
+        };
+        Some(Fitted { samples: 0, leaf })
     }
 }
 
@@ -166,12 +183,18 @@ impl Fit for SquaredChord<'_> {
         if self.is_hopeless {
             return Fitted { samples: 0, leaf: Some(ChordLeaf::Traced) };
         }
-        let all = (FIT_LINES + super::cubic::MORE_LINES + TEST_LINES) as u64;
+        if !self.is_convex()
+            && let Some(known) = self.without_samples(place)
+        {
+            return known;
+        }
+        let all = (FIT_LINES + MORE_LINES + TEST_LINES) as u64;
         let Some(look) = self.look_at(place) else {
-            let leaf = if self.is_certainly_empty(place) { ChordLeaf::Empty } else { ChordLeaf::Traced };
+            let shaft = Shaft::new(&self.frame, place, self.body.surface());
+            let leaf = if shaft.misses_all() { ChordLeaf::Empty } else { ChordLeaf::Traced };
             return Fitted { samples: all, leaf: Some(leaf) };
         };
-        let is_deepest = place.depth / 4 >= self.first_level + MOST_SPLITS;
+        let is_deepest = place.depth / 4 >= self.deepest_level;
         let leaf = match look.fit {
             // Few lines hit, and they are traced.
             None => Some(ChordLeaf::Traced),
@@ -245,95 +268,4 @@ struct CellFit {
     threshold: f64,
     /// The share of hits that splitting would spare to be traced.
     gain_of_split: f64,
-}
-
-/// Exact chords of lines in a cell.
-struct Samples<'f, 'a> {
-    fitter: &'f SquaredChord<'a>,
-    place: &'f Place,
-    locals: Vec<&'static Local>,
-    hits: Vec<Hit>,
-    misses: Vec<Miss>,
-    count: usize,
-}
-
-struct Hit {
-    line: usize,
-    f: f64,
-    quartic: f64,
-    /// |d|² times λ in the middle.
-    middle: f64,
-}
-
-struct Miss {
-    line: usize,
-    quartic: f64,
-}
-
-/// Samples are lines from somewhat before the first plane to somewhat behind the second, so that the body is in between.
-const OVERHANG: f64 = 0.01;
-
-impl<'f, 'a> Samples<'f, 'a> {
-    fn new(fitter: &'f SquaredChord<'a>, place: &'f Place) -> Self {
-        Self {
-            fitter,
-            place,
-            locals: Vec::with_capacity(160),
-            hits: Vec::with_capacity(160),
-            misses: Vec::new(),
-            count: 0,
-        }
-    }
-
-    fn local(&self, line: usize) -> &'static Local {
-        self.locals[line]
-    }
-
-    fn take(&mut self, places: &'static [Local]) {
-        let axis = self.place.pair.axes()[0];
-        let (centre, half) =
-            (self.place.cell.centre(), 0.5 * (self.place.cell.high[0] - self.place.cell.low[0]));
-        let stuv = |place: &Local| -> [f64; 4] { std::array::from_fn(|a| centre[a] + half * place[a]) };
-        let mut rays = Vec::with_capacity(places.len());
-        for place in places {
-            let [start, end] = self.fitter.frame.ends(axis, stuv(place));
-            let way = end - start;
-            let ray = Segment::along(start - OVERHANG * way, (1.0 + 2.0 * OVERHANG) * way);
-            rays.push(ray.expect("the planes of a frame are finite and apart"));
-        }
-        let mut ends = Ends(vec![None; rays.len()]);
-        self.fitter.body.trace(self.fitter.engine, 0, &rays, &mut ends);
-        for ((place, ray), ends) in places.iter().zip(&rays).zip(&ends.0) {
-            let (stuv, line) = (stuv(place), self.count);
-            let quartic = quartic(&stuv);
-            match ends {
-                Some(ends) => {
-                    let to_lambda = (1.0 + 2.0 * OVERHANG) / ray.length_mm();
-                    let [a, b] = ends.map(|t| t * to_lambda - OVERHANG);
-                    let span = squared_span(&stuv);
-                    self.hits.push(Hit {
-                        line,
-                        f: (span * (b - a)).powi(2),
-                        quartic,
-                        middle: span * 0.5 * (a + b),
-                    });
-                }
-                None => self.misses.push(Miss { line, quartic }),
-            }
-            self.locals.push(place);
-            self.count += 1;
-        }
-    }
-}
-
-/// The first entry and the last exit of each ray, mm.
-struct Ends(Vec<Option<[f64; 2]>>);
-
-impl Record for Ends {
-    const ASKS_FACES: bool = false;
-
-    fn crossing(&mut self, ray: usize, t_mm: f64, _face: u32, _way: Way) {
-        // A line along a face may leave and enter again within rounding; a convex body has one chord.
-        self.0[ray] = Some(self.0[ray].map_or([t_mm; 2], |[a, b]| [t_mm.min(a), t_mm.max(b)]));
-    }
 }

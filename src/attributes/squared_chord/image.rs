@@ -54,9 +54,10 @@ impl<'a> ImageChords<'a> {
     /// Makes the body of `fitter` ready for `grid`'s rays. `None` if it does not lie wholly between where rays start and where
     /// they end.
     pub fn new(fitter: &SquaredChord<'a>, grid: &RayGrid) -> Option<Self> {
-        let rows = rows_within(fitter.body.surface(), fitter.body.walker()?, grid)?;
+        let rows = rows_within(fitter.body.surface(), fitter.body.walker(), grid)?;
         let lines = ImageLines::new(&fitter.frame, grid);
-        let exact = fitter.body.view(grid, Some(Engine::Walk));
+        let engine = if fitter.is_convex() { Engine::Walk } else { Engine::Bvh };
+        let exact = fitter.body.view(grid, Some(engine));
         Some(Self { lines, rows, exact })
     }
 
@@ -119,7 +120,7 @@ impl<'a> ImageChords<'a> {
         if pixels.iter().next().is_none() {
             return;
         }
-        let arch = pulp::Arch::new();
+        let arch = crate::dispatch::arch();
         let mut factors = RowFactors::new();
         self.lines.by_dominant_axis(&pixels, |axis, sign, pixels| {
             let forms = self.lines.forms(axis, sign);

@@ -22,11 +22,17 @@
 //!
 //! **What is proved.** That a cell is empty, and that a pixel lies beyond the body's outline. A line of a cell that some lines
 //! hit is never taken to miss: it is known, or traced.
+//!
+//! **Bodies that are not convex** have several chords on some lines, F stands for the square of their sum, and a thin part
+//! between a cell's samples could go unseen. So a cell is fitted only if all its lines cross the surface equally often, which
+//! is proved from the faces in its [shaft](shaft::Shaft); lines of all others are traced.
 
 mod cubic;
 mod fit;
 mod image;
 mod outline;
+mod samples;
+mod shaft;
 #[cfg(test)]
 mod tests;
 
@@ -38,7 +44,7 @@ use crate::linespace::{LineFrame, PlanePair, is_in_range, squared_span};
 use cubic::Cubic;
 pub use image::{ImageChords, ImageLengths, Run, places_of};
 
-/// Fits the squared chord of one convex body.
+/// Fits the squared chord of one body.
 pub struct SquaredChord<'a> {
     body: &'a Body,
     engine: Engine,
@@ -46,6 +52,8 @@ pub struct SquaredChord<'a> {
     tolerance_mm: f64,
     wants_places: bool,
     first_level: u32,
+    /// Cells of this level are split no more.
+    deepest_level: u32,
     /// The error of F that facets make, which no split mends.
     noise: f64,
     /// Whether facets or edges leave next to nothing to be known within the tolerance.
@@ -110,10 +118,10 @@ pub enum Known {
 }
 
 impl<'a> SquaredChord<'a> {
-    /// The chords of `body` to within `tolerance_mm`; with `wants_places`, also where they lie. `None` if the body is not
-    /// convex, or too flat to have a frame.
+    /// The chords of `body` to within `tolerance_mm`; with `wants_places`, also where they lie. `None` if the body is too
+    /// flat to have a frame.
     pub fn new(body: &'a Body, tolerance_mm: f64, wants_places: bool) -> Option<Self> {
-        let (middle, to_ball) = body.walker()?.ball_frame();
+        let (middle, to_ball) = body.ball_frame();
         // The ball's radius is 1: a hundredth more does no harm.
         let reach = |axis: DVec3| {
             let normal = to_ball.transpose() * axis;
@@ -130,10 +138,15 @@ impl<'a> SquaredChord<'a> {
             tolerance_mm,
             wants_places,
             first_level: 0,
+            deepest_level: 0,
             noise: 0.0,
             is_hopeless: false,
         };
         Some(fitter.with_first_level())
+    }
+
+    fn is_convex(&self) -> bool {
+        self.body.convexity().is_ok()
     }
 
     /// The frame of its lines.

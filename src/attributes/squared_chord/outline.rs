@@ -1,4 +1,4 @@
-//! The pixels at which a convex body may be seen: those within a polygon around its outline.
+//! The pixels at which a body may be seen: those within a polygon around its outline.
 //!
 //! Each side of the polygon is a plane through the source that no vertex is beyond; found in a few steps (Dinkelbach 1967,
 //! doi:10.1287/mnsc.13.7.492), each to the vertex that is farthest beyond the last.
@@ -73,9 +73,9 @@ fn shares(surface: &ClosedMesh, grid: &RayGrid) -> [f64; 2] {
     [middle - half, middle + half]
 }
 
-/// The pixels of each row that the body inside a convex surface may be seen at; all others miss, proved. `None` if the body
+/// The pixels of each row that the body inside a surface may be seen at; all others miss, proved. `None` if the body
 /// does not lie wholly between where rays start and where they end.
-pub fn rows_within(surface: &ClosedMesh, walker: &Walker, grid: &RayGrid) -> Option<Vec<Range<u32>>> {
+pub fn rows_within(surface: &ClosedMesh, walker: Option<&Walker>, grid: &RayGrid) -> Option<Vec<Range<u32>>> {
     let [nearest, farthest] = shares(surface, grid);
     // Written so that NaN is not within.
     let is_within = nearest > 1e-9 && farthest < 1.0;
@@ -93,7 +93,7 @@ pub fn rows_within(surface: &ClosedMesh, walker: &Walker, grid: &RayGrid) -> Opt
         let along = cos * sight.column + sin * sight.row;
         let slack = SLACK_PIXELS * least_depth;
         let mut most = sight.place(touching, along);
-        for _ in 0..GUESSES {
+        for walker in walker.iter().flat_map(|walker| [walker; GUESSES]) {
             most = most.max(sight.place(walker.vertex_towards(along - most * sight.depth), along));
         }
         loop {

@@ -61,7 +61,7 @@ fn shapes() -> Vec<(&'static str, Body)> {
 
 /// Lines through two points of a somewhat larger ellipsoid of inertia: as many hit a needle as a ball.
 fn lines_near(body: &Body, seed: u64, count: usize) -> Vec<Line> {
-    let (middle, to_ball) = body.walker().expect("convex").ball_frame();
+    let (middle, to_ball) = body.ball_frame();
     let from_ball = to_ball.inverse();
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut point = || middle + from_ball * (1.1 * DVec3::from([0; 3].map(|_| rng.random_range(-1.0..1.0))));
@@ -285,7 +285,7 @@ fn single_lines_and_threads_get_the_same_bits() {
 fn pixels_beyond_the_outline_miss_and_few_within_do() {
     for (name, body) in shapes() {
         for grid in grids(200, body.bounds().centre()) {
-            let rows = outline::rows_within(body.surface(), body.walker().expect("convex"), &grid)
+            let rows = outline::rows_within(body.surface(), body.walker(), &grid)
                 .expect("between source and pixels");
             let mut lengths = vec![0.0; grid.whole().pixels()];
             body.view(&grid, None).trace(&grid.whole(), &mut Lengths(&mut lengths));

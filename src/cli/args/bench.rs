@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::{BeamArgs, parse_mm, parse_pixels};
+use crate::modes::bench::paper::{Input, input_named};
+use crate::modes::bench::scale::study_names;
 
 /// `bench`.
 #[derive(Debug, Subcommand)]
@@ -15,6 +17,9 @@ pub enum BenchCommand {
     Scale(ScaleArgs),
     /// How far what `--method auto` chooses is from the best of all methods, over faces, pixels, views and tolerances.
     Choice(ChoiceArgs),
+    /// The tables and figures of Atalay & Mount on this machine, beside their own: what the paper's trees gain and lose as
+    /// their settings change.
+    Paper(PaperArgs),
 }
 
 /// `bench choice`.
@@ -78,9 +83,45 @@ pub struct CurveArgs {
 /// `bench scale`.
 #[derive(Debug, Args)]
 pub struct ScaleArgs {
+    /// The studies to run; all if left out.
+    #[arg(
+        long,
+        value_delimiter = ',',
+        value_name = "LIST",
+        value_parser = clap::builder::PossibleValuesParser::new(study_names())
+    )]
+    pub studies: Vec<String>,
+
     /// What all benchmarks share.
     #[command(flatten)]
     pub run: RunArgs,
+}
+
+/// `bench paper`.
+#[derive(Debug, Args)]
+pub struct PaperArgs {
+    /// What is rendered: the paper's scenes, and the adult phantom.
+    #[arg(
+        long,
+        value_delimiter = ',',
+        value_name = "NAME,…",
+        value_parser = parse_input,
+        default_value = "bezier-surface,random-volumes,random-volumes-absorption,tomatoes,adult"
+    )]
+    pub scenes: Vec<Input>,
+
+    /// The pictures' sides as a share of the paper's; 1 if left out, a tenth with --quick.
+    #[arg(long, value_name = "SHARE")]
+    pub scale: Option<f64>,
+
+    /// What all benchmarks share.
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+fn parse_input(text: &str) -> Result<Input, String> {
+    let names = Input::ALL.map(Input::name).join(", ");
+    input_named(text).ok_or_else(|| format!("give some of {names}"))
 }
 
 /// What all benchmarks share.

@@ -10,31 +10,16 @@
 //! left to the engine for single rays, as are rays in the plane of a face: what a ray gets depends on it alone, not on its
 //! block.
 
-use std::ops::Range;
-
 use pulp::Simd;
 
-use super::cells::{CellFace, Pixels};
+use super::aspect::Edge;
 use super::edge_on::{self, EdgeOn};
-use super::face::{Edge, Slope, greater, order};
-use super::projection::Place;
-use super::round;
-use super::tracer::{BLOCK_COLUMNS, BLOCK_ROWS, RUN, Tracer, sorted};
+use super::face::Slope;
+use super::pixels::Pixels;
+use super::rows::{Covered, LANES, first_lanes, is_any};
+use super::tracer::{RUN, SeenFace, Tracer};
 use crate::exact::record::{Passes, Record, Way};
-use crate::geometry::Upstream;
-
-/// No instructions handle more pixels side by side.
-const LANES: usize = 8;
-
-/// Pixels of the body's rectangle for each face, at most. Where faces cover more, quotients at once are as quick as depths that are
-/// gone through again.
-pub const MOST_PIXELS: usize = 8;
-
-/// A row of depths: lanes may reach beyond the block on either side.
-const PITCH: usize = BLOCK_COLUMNS as usize + 2 * LANES;
-
-/// Depths of one way.
-const PLANE: usize = PITCH * BLOCK_ROWS as usize;
+use crate::geometry::{RayGrid, Upstream};
 
 /// Stands for no depth: those are no less than 0. Alike for both ways, so that the length between is 0.
 const UNSET: f64 = -1.0;
@@ -49,16 +34,42 @@ const SIDE_ERROR: f64 = 1e-12;
 /// The depths of a block's rays where they enter and where they leave. Unset between blocks.
 #[derive(Default)]
 pub struct Depths {
+    /// Those of the entries, row by row, then those of the exits.
     planes: Vec<f64>,
+    /// The block's first column and row.
+    first: [i32; 2],
+    /// From row to row: lanes may reach beyond the block on either side.
+    pitch: usize,
+    /// Depths of a way.
+    plane: usize,
     is_any_set: bool,
 }
 
-/// The plane of depths of a way.
-#[inline(always)]
-fn plane_of(way: Way) -> usize {
-    match way {
-        Way::In => 0,
-        Way::Out => PLANE,
+impl Depths {
+    /// Begins a block. All depths are unset then, whatever the shape of the last.
+    fn begin(&mut self, block: &Pixels) {
+        self.first = [block.columns.start, block.rows.start];
+        self.pitch = block.columns.len() + 2 * LANES;
+        self.plane = self.pitch * block.rows.len();
+        self.planes.resize(2 * self.plane, UNSET);
+    }
+
+    /// Where the depth of an entry stands: of one of the block's pixels, or up to `LANES` columns off it.
+    #[inline(always)]
+    fn entry_at(&self, row: i32, column: i32) -> usize {
+        (row - self.first[1]) as usize * self.pitch + (column - self.first[0] + LANES as i32) as usize
+    }
+
+    #[inline(always)]
+    fn at(&self, way: Way, row: i32, column: i32) -> usize {
+        self.entry_at(row, column) + if way == Way::Out { self.plane } else { 0 }
+    }
+
+    fn unset(&mut self, row: i32, column: i32) {
+        for way in [Way::In, Way::Out] {
+            let at = self.at(way, row, column);
+            self.planes[at] = UNSET;
+        }
     }
 }
 
@@ -73,32 +84,6 @@ fn set<S: Simd>(simd: S, old: &mut S::f64s, depths: S::f64s, is_inside: S::m64s)
     simd.and_m64s(is_inside, is_set)
 }
 
-impl Depths {
-    fn unset(&mut self, at: usize) {
-        for plane in [Way::In, Way::Out].map(plane_of) {
-            self.planes[plane + at] = UNSET;
-        }
-    }
-}
-
-/// An edge of a small face, in columns and rows from the first of its box.
-#[derive(Clone, Copy)]
-struct SmallEdge {
-    from: [f64; 2],
-    along: [f64; 2],
-}
-
-impl SmallEdge {
-    /// `sign` is that of the face's area, so that pixels within it are left of all edges.
-    #[inline(always)]
-    fn new(from: &Place, to: &Place, [column, row]: [i32; 2], sign: f64) -> Self {
-        Self {
-            from: [from.x - f64::from(column), from.y - f64::from(row)],
-            along: [sign * (to.x - from.x), sign * (to.y - from.y)],
-        }
-    }
-}
-
 impl Tracer<'_, '_> {
     /// Traces a block of a convex body seen from without.
     #[inline(always)]
@@ -108,20 +93,12 @@ impl Tracer<'_, '_> {
         block: &Pixels,
         record: &mut R,
     ) {
-        self.block.depths.planes.resize(2 * PLANE, UNSET);
-        self.list_edge_on(block);
-        let seen = self.seen;
-        for cells in &seen.cells {
-            for faces in cells.near(block) {
-                for face in faces {
-                    self.mark::<CONE, S>(simd, face, block);
-                }
-            }
-        }
+        self.block.depths.begin(block);
+        self.each_face::<CONE>(block, |tracer, face| tracer.mark(simd, face, block));
         if !self.block.edge_on.is_empty() {
             edge_on::sort(&mut self.block.edge_on);
             for e in &self.block.edge_on {
-                self.block.depths.unset(depth_at(block, e.row, e.column));
+                self.block.depths.unset(e.row, e.column);
             }
             self.trace_edge_on(record);
         }
@@ -132,90 +109,69 @@ impl Tracer<'_, '_> {
 
     /// Marks the depths of a face at the pixels it covers.
     #[inline(always)]
-    fn mark<const CONE: bool, S: Simd>(&mut self, simd: S, face: &CellFace, block: &Pixels) {
-        let seen = self.seen;
-        let [a, b, c] = face.corners.map(|v| &seen.places[v as usize]);
-        let columns = [round::ceil(a.x), round::ceil(b.x), round::ceil(c.x)];
-        let rows = [round::ceil(a.y), round::ceil(b.y), round::ceil(c.y)];
-        let ([left, _, right], [first_row, turn, last_row]) = (sorted(columns), sorted(rows));
-        let within = first_row.max(block.rows.start)..last_row.min(block.rows.end);
-        if within.is_empty() || left >= block.columns.end || right <= block.columns.start {
-            return;
-        }
-        // Of the whole way, from the source to the pixel: shares from 0 to 1.
-        let limits = if CONE { [1.0, f64::INFINITY] } else { [0.0, 1.0] };
-        let (mut slope, is_sure) = Slope::new([a, b, c], seen.care, limits);
-        if !is_sure {
-            slope = self.look_closely(face, limits, block);
-        }
+    fn mark<S: Simd>(&mut self, simd: S, face: &SeenFace, block: &Pixels) {
+        let slope = self.slope_of(face, block);
         self.block.depths.is_any_set = true;
-        let outline = Outline { face: face.number, corners: [a, b, c], slope, rows, turn };
-        if is_sure && right - left <= SMALL && last_row - first_row <= SMALL {
-            self.mark_small(simd, &outline, [left, first_row], within, block);
+        let pixels = self.aspect.pixels(face.face);
+        let is_small = pixels.columns.len() as i32 <= SMALL && pixels.rows.len() as i32 <= SMALL;
+        if is_small && self.aspect.is_sure(face.face) {
+            self.mark_small(simd, face, &slope, &pixels, block);
         } else {
-            self.mark_rows(simd, &outline, within, &block.columns, block);
+            self.mark_rows(simd, face, &slope, &pixels.intersection(block));
         }
     }
 
-    /// Marks rows of pixels, from edge to edge, but none beyond some columns.
+    /// Marks rows of pixels, from edge to edge, but only `pixels`, which are in the block.
     #[inline(always)]
-    fn mark_rows<S: Simd>(
-        &mut self,
-        simd: S,
-        outline: &Outline,
-        rows: Range<i32>,
-        columns: &Range<i32>,
-        block: &Pixels,
-    ) {
-        let columns = columns.start.max(block.columns.start)..columns.end.min(block.columns.end);
-        let (order, is_even) = order(outline.rows);
-        let [a, b, c] = order;
-        let [low, mid, high] = [outline.corners[a], outline.corners[b], outline.corners[c]];
-        let (long, below, above) = (Edge::new(low, high), Edge::new(low, mid), Edge::new(mid, high));
+    fn mark_rows<S: Simd>(&mut self, simd: S, face: &SeenFace, slope: &Slope, pixels: &Pixels) {
+        let corners = [0, 1, 2].map(|corner| self.aspect.corner(face.face, corner));
+        let is_even = self.rows.find(simd, &corners, pixels, self.seen.crossing_error);
         let is_right_out = is_even != self.seen.projection.is_mirrored();
-        let slope = &outline.slope;
-        for row in rows {
-            let by_long = long.first_right(row, self.seen.crossing_error);
-            let short = if row < outline.turn { below } else { above };
-            let by_short = short.first_right(row, self.seen.crossing_error);
-            let start = by_long.min(by_short).max(columns.start);
-            let end = by_long.max(by_short).min(columns.end);
-            let way = if (by_long < by_short) == is_right_out { Way::Out } else { Way::In };
-            let of_row = slope.row(row);
-            if start >= end {
+        for (i, row) in pixels.rows.clone().enumerate() {
+            let Covered { start, count, is_long_left } = self.rows.covered(i);
+            if count <= 0 {
                 continue;
             }
-            let at = plane_of(way) + depth_at(block, row, start);
-            let groups = (end - start) as usize / S::F64_LANES + 1;
+            let of_row = slope.row(row);
+            let way = if is_long_left == is_right_out { Way::Out } else { Way::In };
+            let groups = (count as usize).div_ceil(S::F64_LANES);
+            let at = self.block.depths.at(way, row, start);
             let depths = &mut self.block.depths.planes[at..at + groups * S::F64_LANES];
             let mut lanes = simd.add_f64s(simd.splat_f64s(f64::from(start)), first_lanes(simd));
+            let end = simd.splat_f64s(f64::from(start + count));
             for (group, old) in S::as_mut_simd_f64s(depths).0.iter_mut().enumerate() {
-                let is_before_end = simd.less_than_f64s(lanes, simd.splat_f64s(f64::from(end)));
+                let is_before_end = simd.less_than_f64s(lanes, end);
                 let is_twice = set(simd, old, slope.depths(simd, of_row, lanes), is_before_end);
                 if is_any(simd, is_twice) {
                     let column = start + (group * S::F64_LANES) as i32;
-                    note_twice(simd, &mut self.block.edge_on, outline.face, [column, row], is_twice);
+                    note_twice(simd, &mut self.block.edge_on, face.number, [column, row], is_twice);
                 }
                 lanes = simd.add_f64s(lanes, simd.splat_f64s(S::F64_LANES as f64));
             }
         }
     }
 
-    /// Marks a face in a small box, from its first pixel on.
+    /// Marks a face that covers few pixels.
     #[inline(always)]
     fn mark_small<S: Simd>(
         &mut self,
         simd: S,
-        outline: &Outline,
-        [left, first_row]: [i32; 2],
-        rows: Range<i32>,
+        face: &SeenFace,
+        slope: &Slope,
+        pixels: &Pixels,
         block: &Pixels,
     ) {
-        let [a, b, c] = outline.corners;
-        let is_positive = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y) > 0.0;
-        let sign = if is_positive { 1.0 } else { -1.0 };
+        let (left, first_row) = (pixels.columns.start, pixels.rows.start);
+        let rows = first_row.max(block.rows.start)..pixels.rows.end.min(block.rows.end);
+        let is_positive = self.aspect.area(face.face) > 0.0;
         let way = if is_positive != self.seen.projection.is_mirrored() { Way::Out } else { Way::In };
-        let edges = [(a, b), (b, c), (c, a)].map(|(p, q)| SmallEdge::new(p, q, [left, first_row], sign));
+        let edges = self.aspect.edges(face.face);
+        let mut of_rows = [[0.0; LANES]; 3];
+        for (of_rows, Edge { from, along }) in of_rows.iter_mut().zip(&edges) {
+            for (height, of_row) in of_rows[..SMALL as usize].iter_mut().enumerate() {
+                *of_row = along[0] * (height as f64 - from[1]);
+            }
+        }
         let [least, most] = [block.columns.start, block.columns.end - 1].map(|c| f64::from(c - left));
         for group in (0..SMALL).step_by(S::F64_LANES) {
             let lanes = simd.add_f64s(simd.splat_f64s(f64::from(group)), first_lanes(simd));
@@ -226,33 +182,31 @@ impl Tracer<'_, '_> {
             let columns = simd.add_f64s(simd.splat_f64s(f64::from(left)), lanes);
             // What no edge changes: within them.
             let mut across = [simd.splat_f64s(0.0); 3];
-            for (across, SmallEdge { from, along }) in across.iter_mut().zip(&edges) {
+            for (across, Edge { from, along }) in across.iter_mut().zip(&edges) {
                 let offsets = simd.sub_f64s(lanes, simd.splat_f64s(from[0]));
                 *across = simd.mul_f64s(simd.splat_f64s(along[1]), offsets);
             }
             for row in rows.clone() {
-                let height = f64::from(row - first_row);
-                let side = |edge: usize| {
-                    let SmallEdge { from, along } = edges[edge];
-                    simd.sub_f64s(simd.splat_f64s(along[0] * (height - from[1])), across[edge])
-                };
+                let height = (row - first_row) as usize % LANES;
+                let side = |edge: usize| simd.sub_f64s(simd.splat_f64s(of_rows[edge][height]), across[edge]);
                 let (first, second, third) = (side(0), side(1), side(2));
                 let inside = simd.min_f64s(simd.min_f64s(first, second), third);
                 let is_inside = simd.less_than_f64s(simd.splat_f64s(SIDE_ERROR), inside);
                 let may_be = simd.less_than_or_equal_f64s(simd.splat_f64s(-SIDE_ERROR), inside);
                 if is_any(simd, simd.xor_m64s(is_inside, may_be)) {
                     let columns = left + group..left + group + S::F64_LANES as i32;
-                    self.mark_in_doubt(simd, outline, row, columns, block);
+                    let doubtful = Pixels { columns, rows: row..row + 1 };
+                    self.mark_in_doubt(simd, face, slope, &doubtful.intersection(block));
                     continue;
                 }
-                let depths = outline.slope.depths(simd, outline.slope.row(row), columns);
-                let at = plane_of(way) + depth_at(block, row, left + group);
+                let depths = slope.depths(simd, slope.row(row), columns);
+                let at = self.block.depths.at(way, row, left + group);
                 let old = &mut self.block.depths.planes[at..at + S::F64_LANES];
                 let old = &mut S::as_mut_simd_f64s(old).0[0];
                 let is_twice = set(simd, old, depths, simd.and_m64s(is_inside, is_in_block));
                 if is_any(simd, is_twice) {
                     let first = [left + group, row];
-                    note_twice(simd, &mut self.block.edge_on, outline.face, first, is_twice);
+                    note_twice(simd, &mut self.block.edge_on, face.number, first, is_twice);
                 }
             }
         }
@@ -261,15 +215,10 @@ impl Tracer<'_, '_> {
     /// Marks some columns of a row by exact signs.
     #[cold]
     #[inline(never)]
-    fn mark_in_doubt<S: Simd>(
-        &mut self,
-        simd: S,
-        outline: &Outline,
-        row: i32,
-        columns: Range<i32>,
-        block: &Pixels,
-    ) {
-        self.mark_rows(simd, outline, row..row + 1, &columns, block);
+    fn mark_in_doubt<S: Simd>(&mut self, simd: S, face: &SeenFace, slope: &Slope, pixels: &Pixels) {
+        if !pixels.is_empty() {
+            self.mark_rows(simd, face, slope, pixels);
+        }
     }
 
     /// Reports all rays of the block, and leaves the depths unset.
@@ -279,15 +228,14 @@ impl Tracer<'_, '_> {
         for row in block.rows.clone() {
             for start in block.columns.clone().step_by(RUN) {
                 let count = RUN.min((block.columns.end - start) as usize);
-                let at = depth_at(block, row, start);
+                let at = self.block.depths.entry_at(row, start);
                 let ray = self.ray(row, start);
-                let (first, second) = self.block.depths.planes.split_at_mut(PLANE);
+                let plane = self.block.depths.plane;
+                let (first, second) = self.block.depths.planes.split_at_mut(plane);
                 let (ins, outs) = (&mut first[at..at + count], &mut second[at..at + count]);
-                let mut most = UNSET;
-                for &depth in ins.iter() {
-                    most = greater(depth, most);
-                }
-                if most < 0.0 {
+                // By bits, as the greatest of many doubles is found one after the other.
+                let set = ins.iter().fold(0, |set, depth| set | (depth.to_bits() ^ UNSET.to_bits()));
+                if set == 0 {
                     continue;
                 }
                 let lengths = &mut lengths[..count];
@@ -329,43 +277,21 @@ fn note_twice<S: Simd>(
     pixels.extend(twice.map(|i| EdgeOn { row, column: column + i as i32, face }));
 }
 
-/// 0, 1, 2, …
-#[inline(always)]
-fn first_lanes<S: Simd>(_: S) -> S::f64s {
-    S::as_simd_f64s(&[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0][..S::F64_LANES]).0[0]
-}
-
-#[inline(always)]
-fn is_any<S: Simd>(simd: S, mask: S::m64s) -> bool {
-    simd.first_true_m64s(mask) < S::F64_LANES
-}
-
-/// A face in the image.
-struct Outline<'s> {
-    face: u32,
-    corners: [&'s Place; 3],
-    slope: Slope,
-    /// Ceilings of the corners' rows.
-    rows: [i32; 3],
-    /// The middle of them.
-    turn: i32,
-}
-
-/// Where the depth of a pixel stands in its plane: of one of the block, or up to `LANES` columns off it.
-#[inline(always)]
-fn depth_at(block: &Pixels, row: i32, column: i32) -> usize {
-    (row - block.rows.start) as usize * PITCH + (column - block.columns.start + LANES as i32) as usize
-}
-
 /// The lengths of rays in a row: to the last bit those of their segments.
 #[inline(always)]
-pub fn measure(grid: &crate::geometry::RayGrid, row: i32, first: i32, lengths: &mut [f64]) {
-    match grid.upstream() {
-        Upstream::Path(path) => lengths.fill(path.length()),
-        Upstream::Source(source) => {
-            for (i, length) in lengths.iter_mut().enumerate() {
-                *length = (grid.point((first + i as i32) as u32, row as u32) - source).length();
-            }
-        }
+pub fn measure(grid: &RayGrid, row: i32, first: i32, lengths: &mut [f64]) {
+    let source = match grid.upstream() {
+        Upstream::Path(path) => return lengths.fill(path.length()),
+        Upstream::Source(source) => source,
+    };
+    // Coordinate by coordinate as the grid has it, in the same order, for many rays at a time.
+    let ([by_column, by_row], origin) = (grid.steps(), grid.origin());
+    let of_row = f64::from(row) * by_row;
+    for (i, length) in lengths.iter_mut().enumerate() {
+        let column = f64::from(first + i as i32);
+        let x = origin.x + column * by_column.x + of_row.x - source.x;
+        let y = origin.y + column * by_column.y + of_row.y - source.y;
+        let z = origin.z + column * by_column.z + of_row.z - source.z;
+        *length = (x * x + y * y + z * z).sqrt();
     }
 }

@@ -1,9 +1,10 @@
 //! Rays in the plane of a face: the face is seen as a line, and covers nothing, yet a closed body counts the length in it.
 //!
 //! Such rays are few, and are left to the engine that can tell ([`bvh`](crate::exact::bvh)). A pixel within rounding of a
-//! face that is edge-on within rounding is one of them; no more is claimed, as the answer is exact either way.
+//! face that is edge-on within rounding is one of them; no more is claimed, as the answer is exact either way. So are the
+//! pixels of faces all but edge-on, whose depth f64 cannot tell ([`careful`](super::face::Slope::careful)).
 
-use super::cells::Pixels;
+use super::pixels::Pixels;
 use super::projection::Place;
 
 /// A pixel whose ray may lie in a face.
@@ -82,10 +83,4 @@ pub fn sort(pixels: &mut Vec<EdgeOn>) {
 /// Whether a pixel is in a sorted list.
 pub fn is_listed(pixels: &[EdgeOn], row: i32, column: i32) -> bool {
     pixels.binary_search_by_key(&(row, column), |e| (e.row, e.column)).is_ok()
-}
-
-/// The part of a sorted list in some rows.
-pub fn in_rows<'a>(pixels: &'a [EdgeOn], rows: &std::ops::Range<i32>) -> &'a [EdgeOn] {
-    let before = |row: i32| pixels.partition_point(|e| e.row < row);
-    &pixels[before(rows.start)..before(rows.end)]
 }

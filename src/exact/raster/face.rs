@@ -24,9 +24,10 @@ use crate::geometry::numeric::{DoubleDouble, gamma};
 /// Where an edge crosses rows. Of its ends, the first is the lower.
 #[derive(Clone, Copy)]
 pub struct Edge {
-    low: [f64; 2],
+    pub low: [f64; 2],
     high: [f64; 2],
-    slope: f64,
+    /// Columns by row.
+    pub slope: f64,
 }
 
 impl Edge {
@@ -82,12 +83,12 @@ pub fn order([a, b, c]: [i32; 3]) -> ([usize; 3], bool) {
 /// The depth over a face: affine in column and row.
 #[derive(Clone, Copy)]
 pub struct Slope {
-    base: Place,
-    per_column: f64,
-    per_row: f64,
+    pub base: Place,
+    pub per_column: f64,
+    pub per_row: f64,
     /// Of the corners: rounding may not put a crossing off the face.
-    lowest: f64,
-    highest: f64,
+    pub lowest: f64,
+    pub highest: f64,
 }
 
 /// Which faces need a closer look: factors of their extents.
@@ -96,6 +97,8 @@ pub struct Care {
     per_pixel: f64,
     per_depth: f64,
     of_thickness: f64,
+    /// How far off a depth may be.
+    depth_error: f64,
 }
 
 impl Care {
@@ -109,6 +112,8 @@ impl Care {
             per_pixel: gamma(12) / place_error,
             per_depth: 1.0 / depth,
             of_thickness: THICKNESS * place_error,
+            // As much as the corners may be off, over the same distance.
+            depth_error: gamma(96) * depth,
         }
     }
 }
@@ -130,17 +135,28 @@ impl Slope {
         (Self::of([a, b, c], slopes, limits), area.abs() > least)
     }
 
-    /// As above for any face, in double-double. The slopes of one without area are infinite or not numbers.
+    /// As above for any face, in double-double; and whether depths in f64 are right then. The slopes of a face without area are
+    /// infinite or not numbers.
+    ///
+    /// A depth is the sum of two products that may be huge, and errs by γ₈ of them: two roundings of a quotient of a
+    /// rounded area, an offset, a product and two sums. Of a face seen all but edge-on that is as little as a move in place
+    /// of γ₈ of its extent, yet may put the crossing far beyond the face's edge, where the body ends.
     #[cold]
     #[inline(never)]
-    pub fn careful([a, b, c]: [Place; 3], limits: [f64; 2]) -> Self {
+    pub fn careful([a, b, c]: [Place; 3], care: Care, limits: [f64; 2]) -> (Self, bool) {
         let edge = |to: Place| {
             [(to.x, a.x), (to.y, a.y), (to.depth, a.depth)].map(|(p, q)| DoubleDouble::difference(p, q))
         };
         let ([x1, y1, z1], [x2, y2, z2]) = (edge(b), edge(c));
         let area = (x1 * y2 - x2 * y1).to_f64();
         let slopes = [(z1 * y2 - z2 * y1).to_f64() / area, (z2 * x1 - z1 * x2).to_f64() / area];
-        Self::of([&a, &b, &c], slopes, limits)
+        let extent = |key: fn(&Place) -> f64| {
+            let [a, b, c] = [&a, &b, &c].map(key);
+            a.max(b).max(c) - a.min(b).min(c)
+        };
+        // Written so that what is not a number is not right.
+        let rise = slopes[0].abs() * extent(|p| p.x) + slopes[1].abs() * extent(|p| p.y);
+        (Self::of([&a, &b, &c], slopes, limits), gamma(8) * rise <= care.depth_error)
     }
 
     #[inline(always)]

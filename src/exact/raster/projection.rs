@@ -77,8 +77,14 @@ impl Projection {
     /// The place of a homogeneous point. In a cone, its share must be positive.
     #[inline(always)]
     pub fn place(&self, point: DVec3) -> Place {
-        let depth = if self.is_cone { 1.0 / point.z } else { point.z };
-        let scale = if self.is_cone { depth } else { 1.0 };
+        if self.is_cone { self.place_in::<true>(point) } else { self.place_in::<false>(point) }
+    }
+
+    /// As [`place`](Self::place), in a cone or in a parallel beam, as it must be.
+    #[inline(always)]
+    pub fn place_in<const CONE: bool>(&self, point: DVec3) -> Place {
+        let depth = if CONE { 1.0 / point.z } else { point.z };
+        let scale = if CONE { depth } else { 1.0 };
         Place { x: unless_tiny(point.x * scale), y: unless_tiny(point.y * scale), depth }
     }
 

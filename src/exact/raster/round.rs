@@ -2,7 +2,7 @@
 
 /// 1.5 · 2⁵²: a double of this size has no bits left for fractions, so adding it rounds to the nearest integer, which then
 /// stands in the lowest bits.
-const WHOLE: f64 = 6_755_399_441_055_744.0;
+pub const WHOLE: f64 = 6_755_399_441_055_744.0;
 
 /// Coordinates beyond this are not rounded right.
 pub const LARGEST: f64 = (1 << 30) as f64;
@@ -11,7 +11,13 @@ pub const LARGEST: f64 = (1 << 30) as f64;
 #[inline(always)]
 pub fn nearest(x: f64) -> (i32, f64) {
     let shifted = x + WHOLE;
-    (shifted.to_bits() as i32, x - (shifted - WHOLE))
+    (whole(shifted), x - (shifted - WHOLE))
+}
+
+/// The integer to which [`WHOLE`] was added.
+#[inline(always)]
+pub fn whole(shifted: f64) -> i32 {
+    shifted.to_bits() as i32
 }
 
 /// The least integer that is not less than `x`.
@@ -19,6 +25,13 @@ pub fn nearest(x: f64) -> (i32, f64) {
 pub fn ceil(x: f64) -> i32 {
     let (integer, above) = nearest(x);
     integer + i32::from(above > 0.0)
+}
+
+/// As [`ceil`], as a double.
+#[inline(always)]
+pub fn ceiling(x: f64) -> f64 {
+    let nearest = (x + WHOLE) - WHOLE;
+    nearest + if x > nearest { 1.0 } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -32,6 +45,7 @@ mod tests {
         {
             for near in [x, x.next_up(), x.next_down()] {
                 assert_eq!(ceil(near), near.ceil() as i32, "{near}");
+                assert_eq!(ceiling(near), near.ceil(), "{near}");
             }
         }
     }

@@ -5,11 +5,16 @@
 
 use std::ops::Range;
 
-use super::cells::{CellFace, Pixels};
+use super::RasterView;
+use super::aspect::Aspect;
 use super::chords::{Depths, measure};
 use super::edge_on::{self, EdgeOn, is_edge_on, is_listed, pixels_along};
-use super::face::{Edge, Slope, order};
-use super::{RasterView, Seen, round};
+use super::face::Slope;
+use super::patches::Patch;
+use super::pixels::Pixels;
+use super::projection::Place;
+use super::rows::{Covered, Rows};
+use super::seen::Seen;
 use crate::exact::record::{Record, Way};
 use crate::geometry::Region;
 
@@ -23,9 +28,13 @@ pub const RUN: usize = 64;
 /// Traces a region.
 pub struct Tracer<'v, 'a> {
     pub view: &'v RasterView<'a>,
-    pub seen: &'v Seen,
+    pub seen: &'v Seen<'a>,
     asked: Pixels,
     pub block: Block,
+    pub aspect: Aspect,
+    pub rows: Rows,
+    /// Patches near a row of blocks, and near a block.
+    near: [Vec<u32>; 2],
 }
 
 /// A tracer at work.
@@ -57,7 +66,19 @@ pub struct Block {
     pub depths: Depths,
 }
 
-/// A face that may cover pixels.
+/// A face that may cover pixels of a block.
+pub struct SeenFace {
+    /// In the patch that is looked at.
+    pub face: usize,
+    /// In the surface.
+    pub number: u32,
+    /// Between which depths are kept.
+    limits: [f64; 2],
+    /// Whether the pixels on it are listed if it is edge-on.
+    is_known: bool,
+}
+
+/// A face whose spans are listed.
 struct Face {
     slope: Slope,
     number: u32,
@@ -74,45 +95,67 @@ struct Span {
 }
 
 impl<'v, 'a> Tracer<'v, 'a> {
-    pub fn new(view: &'v RasterView<'a>, seen: &'v Seen, region: &Region) -> Self {
+    pub fn new(view: &'v RasterView<'a>, seen: &'v Seen<'a>, region: &Region) -> Self {
         // A grid of more than 2³⁰ columns or rows is not seen.
         let pixels = |range: &Range<u32>| range.start as i32..range.end as i32;
         let asked = Pixels { columns: pixels(&region.columns), rows: pixels(&region.rows) };
-        Self { view, seen, asked, block: Block::default() }
+        Self {
+            view,
+            seen,
+            asked,
+            block: Block::default(),
+            aspect: Aspect::default(),
+            rows: Rows::default(),
+            near: Default::default(),
+        }
     }
 
     /// Traces it all, with the widest instructions that the machine has. None of them changes a bit: every operation is
     /// rounded by itself.
     pub fn trace(&mut self, record: &mut impl Record) {
-        pulp::Arch::new().dispatch(Widely { tracer: self, record });
+        crate::dispatch::arch().dispatch(Widely { tracer: self, record });
     }
 
     #[inline(always)]
     fn trace_blocks<S: pulp::Simd, R: Record>(&mut self, simd: S, record: &mut R) {
-        let is_by_chords = self.view.is_convex && self.seen.is_fine && !R::ASKS_FACES;
+        let is_by_chords = self.view.is_convex && !self.seen.source_is_inside && !R::ASKS_FACES;
         let common = self.asked.intersection(&self.seen.bounds);
         for top in common.rows.clone().step_by(BLOCK_ROWS as usize) {
+            let rows = top..(top + BLOCK_ROWS).min(common.rows.end);
+            let [near_rows, _] = &mut self.near;
+            self.seen.list_near(
+                &Pixels { columns: common.columns.clone(), rows: rows.clone() },
+                None,
+                near_rows,
+            );
             for left in common.columns.clone().step_by(BLOCK_COLUMNS as usize) {
-                let block = Pixels {
-                    columns: left..(left + BLOCK_COLUMNS).min(common.columns.end),
-                    rows: top..(top + BLOCK_ROWS).min(common.rows.end),
-                };
+                let columns = left..(left + BLOCK_COLUMNS).min(common.columns.end);
+                let block = Pixels { columns, rows: rows.clone() };
+                let [near_rows, near] = &mut self.near;
+                self.seen.list_near(&block, Some(near_rows), near);
+                if near.is_empty() && !self.seen.source_is_inside {
+                    continue;
+                }
                 match (is_by_chords, self.seen.projection.is_cone()) {
                     (true, true) => self.trace_block_of_chords::<true, S, R>(simd, &block, record),
                     (true, false) => self.trace_block_of_chords::<false, S, R>(simd, &block, record),
-                    (false, true) => self.trace_block::<true>(&block, record),
-                    (false, false) => self.trace_block::<false>(&block, record),
+                    (false, true) => self.trace_block::<true, S>(simd, &block, record),
+                    (false, false) => self.trace_block::<false, S>(simd, &block, record),
                 }
             }
         }
     }
 
     #[inline(always)]
-    fn trace_block<const CONE: bool>(&mut self, block: &Pixels, record: &mut impl Record) {
+    fn trace_block<const CONE: bool, S: pulp::Simd>(
+        &mut self,
+        simd: S,
+        block: &Pixels,
+        record: &mut impl Record,
+    ) {
         self.block.faces.clear();
         self.block.span_count = 0;
-        self.list_edge_on(block);
-        self.cover::<CONE>(block);
+        self.cover::<CONE, S>(simd, block);
         if self.block.span_count > 0 {
             self.measure_rays(block);
         }
@@ -133,89 +176,120 @@ impl<'v, 'a> Tracer<'v, 'a> {
         }
     }
 
-    /// Begins the list of rays to be traced by themselves with those known to lie in faces.
+    /// Goes through the faces that may cover pixels of the block, and begins the list of rays to be traced by themselves with
+    /// those that lie in the faces of patches on a line of pixels.
     #[inline(always)]
-    pub fn list_edge_on(&mut self, block: &Pixels) {
-        let known = self.seen.edge_on.as_deref().unwrap_or_default();
-        let in_block =
-            edge_on::in_rows(known, &block.rows).iter().filter(|e| block.columns.contains(&e.column));
+    pub fn each_face<const CONE: bool>(
+        &mut self,
+        block: &Pixels,
+        mut each: impl FnMut(&mut Self, &SeenFace),
+    ) {
         self.block.edge_on.clear();
-        self.block.edge_on.extend(in_block);
+        let near = std::mem::take(&mut self.near[1]);
+        let seen = self.seen;
+        // Of the whole way, from the source to the pixel: shares from 0 to 1.
+        let limits = if CONE { [1.0, f64::INFINITY] } else { [0.0, 1.0] };
+        for &patch_number in &near {
+            let patch = seen.patches.get(patch_number as usize);
+            self.aspect.place_points(&patch, &seen.projection, seen.patches.are_places());
+            let is_known = seen.sight(patch_number).is_on_a_line;
+            if is_known {
+                self.look_along(&patch, block);
+            }
+            self.aspect.look_at_faces(&patch, block, seen.care, limits);
+            for i in 0..self.aspect.near_count() {
+                let face = self.aspect.near(i);
+                each(self, &SeenFace { face, number: patch.numbers[face], limits, is_known });
+            }
+        }
+        self.near[1] = near;
     }
 
-    /// Lists the faces and what they cover.
-    #[inline(always)]
-    fn cover<const CONE: bool>(&mut self, block: &Pixels) {
-        let seen = self.seen;
-        for cells in &seen.cells {
-            for faces in cells.near(block) {
-                for face in faces {
-                    self.cover_by::<CONE>(face, block);
-                }
+    /// Lists the pixels on edge-on faces of the patch that is looked at.
+    #[cold]
+    #[inline(never)]
+    fn look_along(&mut self, patch: &Patch, block: &Pixels) {
+        for (corners, &number) in patch.corners.iter().zip(patch.numbers) {
+            let places = corners.map(|corner| self.aspect.place_of_point(corner));
+            if is_edge_on(places, self.seen.place_error) {
+                pixels_along(places, number, self.seen.place_error, block, &mut self.block.edge_on);
             }
         }
     }
 
+    /// Lists the faces and what they cover.
     #[inline(always)]
-    fn cover_by<const CONE: bool>(&mut self, face: &CellFace, block: &Pixels) {
-        let seen = self.seen;
-        let [a, b, c] = face.corners.map(|v| v as usize);
-        let (a, b, c) = (&seen.places[a], &seen.places[b], &seen.places[c]);
-        let columns = [round::ceil(a.x), round::ceil(b.x), round::ceil(c.x)];
-        let rows = [round::ceil(a.y), round::ceil(b.y), round::ceil(c.y)];
-        let [first_row, turn, last_row] = sorted(rows);
-        let (start, end) = (first_row.max(block.rows.start), last_row.min(block.rows.end));
-        let [left, _, right] = sorted(columns);
-        if start >= end || left >= block.columns.end || right <= block.columns.start {
-            return;
-        }
-        let (order, is_even) = order(rows);
-        let [low, mid, high] = order.map(|i| &seen.places[face.corners[i] as usize]);
-        let (long, below, above) = (Edge::new(low, high), Edge::new(low, mid), Edge::new(mid, high));
-        let is_right_out = is_even != seen.projection.is_mirrored();
+    fn cover<const CONE: bool, S: pulp::Simd>(&mut self, simd: S, block: &Pixels) {
+        self.each_face::<CONE>(block, |tracer, face| tracer.cover_by(simd, face, block));
+    }
+
+    #[inline(always)]
+    fn cover_by<S: pulp::Simd>(&mut self, simd: S, face: &SeenFace, block: &Pixels) {
+        let slope = self.slope_of(face, block);
+        let pixels = self.aspect.pixels(face.face).intersection(block);
+        let corners = [0, 1, 2].map(|corner| self.aspect.corner(face.face, corner));
+        let is_even = self.rows.find(simd, &corners, &pixels, self.seen.crossing_error);
+        let is_right_out = is_even != self.seen.projection.is_mirrored();
         let slot = self.block.faces.len() as u32;
         let block_spans = &mut self.block;
-        let needed = block_spans.span_count + (end - start) as usize;
+        let needed = block_spans.span_count + pixels.rows.len();
         if block_spans.spans.len() < needed {
             block_spans.spans.resize(2 * needed, Span::default());
         }
         let mut count = block_spans.span_count;
-        for row in start..end {
-            let by_long = long.first_right(row, seen.crossing_error);
-            let short = if row < turn { below } else { above };
-            let by_short = short.first_right(row, seen.crossing_error);
-            let start = by_long.min(by_short).max(block.columns.start);
-            let end = by_long.max(by_short).min(block.columns.end);
+        for (i, row) in pixels.rows.enumerate() {
+            let Covered { start, count: covered, is_long_left } = self.rows.covered(i);
             // Written in any case: that is faster than to ask whether there is something to write.
             block_spans.spans[count] = Span {
                 face: slot,
                 row,
                 start: (start - block.columns.start) as i16,
-                end: (end - block.columns.start) as i16,
-                is_out: (by_long < by_short) == is_right_out,
+                end: (start - block.columns.start + covered) as i16,
+                is_out: is_long_left == is_right_out,
             };
-            count += usize::from(start < end);
+            count += usize::from(covered > 0);
         }
         block_spans.span_count = count;
-        // Of the whole way, from the source to the pixel: shares from 0 to 1.
-        let limits = if CONE { [1.0, f64::INFINITY] } else { [0.0, 1.0] };
-        let (mut slope, is_sure) = Slope::new([a, b, c], seen.care, limits);
-        if !is_sure {
-            slope = self.look_closely(face, limits, block);
-        }
         self.block.faces.push(Face { slope, number: face.number });
     }
 
-    /// The slope of a face that needs care; lists the pixels on it if it is edge-on.
+    /// The slope of a face.
+    #[inline(always)]
+    pub fn slope_of(&mut self, face: &SeenFace, block: &Pixels) -> Slope {
+        if self.aspect.is_sure(face.face) {
+            self.aspect.slope(face.face)
+        } else {
+            self.look_closely(face, block)
+        }
+    }
+
+    /// The slope of a face that needs care. Lists the pixels on it if it is edge-on, and those it covers if its depth there
+    /// cannot be told.
     #[cold]
     #[inline(never)]
-    pub fn look_closely(&mut self, face: &CellFace, limits: [f64; 2], block: &Pixels) -> Slope {
-        let seen = self.seen;
-        let places = face.corners.map(|v| seen.places[v as usize]);
-        if seen.edge_on.is_none() && is_edge_on(places, seen.place_error) {
-            pixels_along(places, face.number, seen.place_error, block, &mut self.block.edge_on);
+    fn look_closely(&mut self, face: &SeenFace, block: &Pixels) -> Slope {
+        let place_error = self.seen.place_error;
+        let places = [0, 1, 2].map(|corner| self.aspect.corner(face.face, corner));
+        if !face.is_known && is_edge_on(places, place_error) {
+            pixels_along(places, face.number, place_error, block, &mut self.block.edge_on);
         }
-        Slope::careful(places, limits)
+        let (slope, is_right) = Slope::careful(places, self.seen.care, face.limits);
+        if !is_right {
+            let pixels = self.aspect.pixels(face.face).intersection(block);
+            self.list_covered(&places, face.number, &pixels);
+        }
+        slope
+    }
+
+    /// Lists those of some pixels that a face covers.
+    #[cold]
+    fn list_covered(&mut self, corners: &[Place; 3], face: u32, pixels: &Pixels) {
+        self.rows.find_one_by_one(corners, pixels, self.seen.crossing_error);
+        for (i, row) in pixels.rows.clone().enumerate() {
+            let Covered { start, count, .. } = self.rows.covered(i);
+            let pixel = |column| EdgeOn { row, column, face };
+            self.block.edge_on.extend((start..start + count).map(pixel));
+        }
     }
 
     /// The lengths of the block's rays.
@@ -233,7 +307,7 @@ impl<'v, 'a> Tracer<'v, 'a> {
     pub fn trace_edge_on(&self, record: &mut impl Record) {
         for e in &self.block.edge_on {
             let pixel = [e.column as u32, e.row as u32];
-            self.view.trace_ray(self.ray(e.row, e.column), pixel, e.face, record);
+            self.view.trace_ray(self.ray(e.row, e.column), pixel, record);
         }
     }
 
@@ -309,11 +383,4 @@ impl<'v, 'a> Tracer<'v, 'a> {
         }
         self.report::<CONE>(&rest, block, t_mm, record);
     }
-}
-
-/// Three numbers from the least to the greatest.
-#[inline(always)]
-pub fn sorted([a, b, c]: [i32; 3]) -> [i32; 3] {
-    let (low, high) = (a.min(b), a.max(b));
-    [low.min(c), low.max(high.min(c)), high.max(c)]
 }

@@ -15,6 +15,7 @@
 //! walk began. What rounding of the vertices could decide wrongly is not decided here: lines within [`Walker`]'s slack of
 //! the outline, faces seen nearly edge-on, and walks longer than any should be, are [`Unsure`] and go to an engine that is not in doubt.
 
+mod abreast;
 mod held;
 mod seeds;
 mod sets;

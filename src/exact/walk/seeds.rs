@@ -10,10 +10,10 @@
 //! For an ellipsoid the ball is the body; elsewhere the distance found first says where to look again.
 
 use glam::{DMat3, DVec3};
-use nalgebra::Matrix3;
 
 use super::{Face, LineView, Seeds, Walker};
 use crate::geometry::numeric::gamma;
+use crate::geometry::{Bounds, ball_of_inertia};
 
 /// A table of faces by direction from the middle.
 #[derive(Clone, Debug)]
@@ -67,7 +67,9 @@ impl SeedTable {
     /// The table of a body.
     pub fn new(walker: &Walker) -> Self {
         let side = (walker.faces.len() / 2).isqrt().clamp(SMALLEST_SIDE, LARGEST_SIDE);
-        let (middle, to_ball) = ball_of_inertia(walker);
+        let bounds = Bounds::of(walker.vertices.iter().copied());
+        let corners = walker.faces.iter().map(|face| face.corners.map(|v| walker.vertices[v as usize]));
+        let (middle, to_ball) = ball_of_inertia(corners, bounds);
         let radius_squared = |v: &DVec3| (to_ball * (*v - middle)).length_squared();
         let farthest = walker.vertices.iter().map(radius_squared).fold(0.0, f64::max);
         let mut table = Self {
@@ -149,33 +151,6 @@ impl SeedTable {
         let (x, y) = (((x * size) as usize).min(self.side - 1), ((y * size) as usize).min(self.side - 1));
         self.cells[y * self.side + x]
     }
-}
-
-/// The centroid of the body's volume, and the map from mm about it to a frame in which its second moments are those of the
-/// unit ball. A body too flat for that is scaled by its box alone.
-fn ball_of_inertia(walker: &Walker) -> (DVec3, DMat3) {
-    let (mut volume, mut first, mut second) = (0.0, DVec3::ZERO, Matrix3::<f64>::zeros());
-    let outer = |v: DVec3| {
-        let v = nalgebra::Vector3::from(v.to_array());
-        v * v.transpose()
-    };
-    for face in &walker.faces {
-        // The tetrahedron from the box's centre.
-        let [a, b, c] = face.corners.map(|v| walker.vertices[v as usize] - walker.centre);
-        let part = a.dot(b.cross(c)) / 6.0;
-        volume += part;
-        first += part * (a + b + c);
-        second += (outer(a) + outer(b) + outer(c) + outer(a + b + c)) * part;
-    }
-    let middle = first / (4.0 * volume);
-    // The second moments of a ball of radius 1 over its volume are 1/5.
-    let spread = (second / (20.0 * volume) - outer(middle)) * 5.0;
-    let to_ball = spread
-        .cholesky()
-        .and_then(|root| root.l().try_inverse())
-        .map(|m| DMat3::from_cols_array(&std::array::from_fn(|i| m[(i % 3, i / 3)])));
-    let by_box = || DMat3::from_diagonal(DVec3::splat(1.0 / walker.reach));
-    (walker.centre + middle, to_ball.filter(|m| m.is_finite()).unwrap_or_else(by_box))
 }
 
 /// The face through which the ray from a point within the body leaves: by a walk from a face nearby that looks along it, or

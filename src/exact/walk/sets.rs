@@ -2,22 +2,28 @@
 
 use std::hint::black_box;
 
+use glam::DVec3;
+
+use super::abreast::{ABREAST, Ranks};
 use super::held::{Alone, Followers, Holding};
 use super::{Pass, Seeds, Unsure, Walker};
 use crate::exact::{Record, Way};
 use crate::geometry::{Interval, RayGrid, Region, Segment, Upstream};
 
-/// Rays of a batch looked up together, so that their ways to memory overlap.
-const TOGETHER: usize = 32;
-
 /// Bodies of fewer faces stay in the second-level cache, where reading ahead gains nothing.
 const FACES_IN_CACHE: usize = 10_000;
+
+/// Over bodies of as many faces, walks in any order wait for memory, and are quicker abreast.
+const MANY_FACES: usize = 80_000;
 
 /// Bodies of as many faces have none that serves many rays of an image.
 const FINE_FACES: usize = 5_000;
 
+/// Fewer rows are walked sooner one by one than abreast.
+const WORTH_IT: usize = 8;
+
 impl Walker {
-    /// Records the crossings of each ray of `region`, numbered row by row; rays in doubt go to `other`.
+    /// Records the crossings of each ray of `region`, numbered row by row, in any order; rays in doubt go to `other`.
     pub fn trace_grid<R: Record>(
         &self,
         grid: &RayGrid,
@@ -30,7 +36,52 @@ impl Walker {
             Upstream::Source(source) if is_coarse => {
                 self.trace_rows(grid, region, record, other, &mut Followers::new(source));
             }
-            _ => self.trace_rows(grid, region, record, other, &mut Alone),
+            _ if is_coarse || region.rows.len() < WORTH_IT => {
+                self.trace_rows(grid, region, record, other, &mut Alone);
+            }
+            _ => self.trace_rows_abreast(grid, region, record, other),
+        }
+    }
+
+    /// Walks over many rows abreast, column by column.
+    fn trace_rows_abreast<R: Record>(
+        &self,
+        grid: &RayGrid,
+        region: &Region,
+        record: &mut R,
+        mut other: impl FnMut(usize, &Segment, &mut R),
+    ) {
+        let mut ranks = Ranks::default();
+        for top in region.rows.clone().step_by(ABREAST) {
+            let rows = top..region.rows.end.min(top + ABREAST as u32);
+            let (mut seeds, mut has_missed) = ([None; ABREAST], [true; ABREAST]);
+            for column in region.columns.clone() {
+                let (mut lines, mut of_lines) = ([None; ABREAST], [FIRST; ABREAST]);
+                for (j, row) in rows.clone().enumerate() {
+                    let target = grid.point(column, row);
+                    let origin = grid.start_of(target);
+                    let dir = target - origin;
+                    // Where one ray misses, the next may pass by far enough to say so at once.
+                    if has_missed[j] && self.seeds.passes_by(origin, dir) {
+                        continue;
+                    }
+                    of_lines[j] = seeds[j].unwrap_or_else(|| self.seeds.near(origin, dir).unwrap_or(FIRST));
+                    lines[j] = Some((origin, dir));
+                }
+                ranks.walk(self, &lines[..rows.len()], &mut of_lines[..rows.len()]);
+                for (j, row) in rows.clone().enumerate() {
+                    let Some((origin, dir)) = lines[j] else { continue };
+                    let ray = (row - region.rows.start) as usize * region.columns.len()
+                        + (column - region.columns.start) as usize;
+                    let answer = self.pass_from(origin, dir, &mut of_lines[j]);
+                    (seeds[j], has_missed[j]) = (Some(of_lines[j]), answer == Ok(None));
+                    match answer {
+                        Ok(Some(pass)) => note(record, ray, &pass, UNIT, dir.length()),
+                        Ok(None) => {}
+                        Err(Unsure) => other(ray, &grid.segment(column, row), record),
+                    }
+                }
+            }
         }
     }
 
@@ -92,16 +143,23 @@ impl Walker {
         record: &mut R,
         mut other: impl FnMut(usize, &Segment, &mut R),
     ) {
-        let mut seeds = [None; TOGETHER];
-        for (i, rays) in rays.chunks(TOGETHER).enumerate() {
-            for (seeds, ray) in seeds.iter_mut().zip(rays) {
-                *seeds = self.seeds.near(ray.line().origin(), ray.line().dir());
+        let mut ranks = Ranks::default();
+        for (i, rays) in rays.chunks(ABREAST).enumerate() {
+            let (mut seeds, mut lines) = ([FIRST; ABREAST], [None; ABREAST]);
+            for ((seeds, line), ray) in seeds.iter_mut().zip(&mut lines).zip(rays) {
+                let (origin, dir) = (ray.line().origin(), ray.line().dir());
+                if let Some(near) = self.seeds.near(origin, dir) {
+                    (*seeds, *line) = (near, Some((origin, dir)));
+                }
             }
-            self.touch(&seeds[..rays.len()]);
-            for (j, (seeds, ray)) in seeds.iter_mut().zip(rays).enumerate() {
-                let Some(seeds) = seeds else { continue };
-                let number = first + i * TOGETHER + j;
-                match self.pass_from(ray.line().origin(), ray.line().dir(), seeds) {
+            self.touch(&lines[..rays.len()], &seeds);
+            if self.faces.len() >= MANY_FACES {
+                ranks.walk(self, &lines[..rays.len()], &mut seeds[..rays.len()]);
+            }
+            for (j, ((seeds, line), ray)) in seeds.iter_mut().zip(lines).zip(rays).enumerate() {
+                let Some((origin, dir)) = line else { continue };
+                let number = first + i * ABREAST + j;
+                match self.pass_from(origin, dir, seeds) {
                     Ok(Some(pass)) => note(record, number, &pass, ray.reach(), 1.0),
                     Ok(None) => {}
                     Err(Unsure) => other(number, ray, record),
@@ -112,12 +170,13 @@ impl Walker {
 
     /// Reads what the walks will begin with: many reads that do not wait for each other, where each walk would wait for its
     /// own.
-    fn touch(&self, seeds: &[Option<Seeds>]) {
+    fn touch(&self, lines: &[Option<(DVec3, DVec3)>], seeds: &[Seeds]) {
         if self.faces.len() < FACES_IN_CACHE {
             return;
         }
         let faces = || {
-            seeds.iter().flatten().flat_map(|s| [&self.faces[s.entry as usize], &self.faces[s.exit as usize]])
+            let used = lines.iter().zip(seeds).filter(|(line, _)| line.is_some());
+            used.flat_map(|(_, s)| [&self.faces[s.entry as usize], &self.faces[s.exit as usize]])
         };
         black_box(faces().fold(0, |sum: u32, face| sum.wrapping_add(face.corners[0])));
         let corners = faces().flat_map(|face| face.corners);

@@ -141,14 +141,15 @@ fn measure(
     cells: &mut Vec<ChoiceCell>,
 ) -> Result<bool> {
     let mut scene = scene(subdivisions, side)?;
-    let views = scene.beam.views()?;
+    let orbit_views = scene.beam.views()?;
     let exact = ENGINES.iter().map(|&engine| Contender::exact(Some(engine)));
     let contenders: Vec<Contender> =
         exact.chain(settings.tolerances_mm.iter().copied().map(Contender::tolerance)).collect();
     let mut orbits = vec![Orbit::default(); contenders.len()];
     let mut shortest = [f64::INFINITY; VIEWS.len()];
     let results = race(contenders.len(), settings.patience, control, |i| {
-        let times = project(&mut scene, &contenders[i], &views, &mut orbits[i], &mut shortest, control)?;
+        let times =
+            project(&mut scene, &contenders[i], &orbit_views, &mut orbits[i], &mut shortest, control)?;
         Ok(times)
     })?;
     let body = &scene.organs[0].body;
@@ -156,7 +157,7 @@ fn measure(
         let seconds = |i: usize| results.times[i][lap].median();
         for (t, &tolerance_mm) in settings.tolerances_mm.iter().enumerate() {
             let tree = ENGINES.len() + t;
-            let demand = Demand { views, pixels: views * u64::from(side) * u64::from(side) };
+            let demand = Demand::of(&orbit_views[..views as usize]);
             let interpolation = Interpolation::SquaredChord { tolerance_mm };
             let trees = TreeSettings { interpolation, ..TreeSettings::default() };
             let estimate = Estimate::of(body, &trees, demand);

@@ -177,7 +177,7 @@ fn measure(
         let mut bytes = vec![0; racers.len()];
         let results = race(racers.len(), settings.patience, control, |racer| {
             let method = settings.contenders[racers[racer]].method;
-            let Run { cold, warm, tree_bytes } = run(&mut working, method, &views, control)?;
+            let Run { cold, warm, tree_bytes, .. } = run(&mut working, method, &views, control)?;
             bytes[racer] = tree_bytes;
             Ok([cold, warm])
         })?;
@@ -236,7 +236,7 @@ fn errors(
 }
 
 /// The scene's views on a detector of so many pixels.
-fn views(scene: &Scene, pixels: [u32; 2]) -> Result<Vec<View>> {
+pub(super) fn views(scene: &Scene, pixels: [u32; 2]) -> Result<Vec<View>> {
     let detector = DetectorSpec { pixels: Some(Given::from(pixels)), ..DetectorSpec::default() };
     let beam = scene.beam.clone().overridden_by(BeamSpec { detector, ..BeamSpec::default() });
     Ok(beam.views()?)

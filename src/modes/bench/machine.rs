@@ -34,7 +34,7 @@ impl Machine {
             threads: rayon::current_num_threads(),
             system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
             optimized: !cfg!(debug_assertions),
-            widest_instructions: widest_instructions(),
+            widest_instructions: crate::dispatch::name(),
             available_bytes: kibibytes("/proc/meminfo", "MemAvailable:").map(|kib| kib * 1024),
             date: SystemTime::now()
                 .duration_since(UNIX_EPOCH)
@@ -61,14 +61,6 @@ fn processor() -> String {
         (Some(name), Some(family), Some(model)) => format!("{name} (family {family}, model {model})"),
         _ => "unknown".into(),
     }
-}
-
-fn widest_instructions() -> &'static str {
-    #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
-        return "AVX2";
-    }
-    "the baseline's"
 }
 
 /// A day counted from 1970-01-01 as year-month-day of the Gregorian calendar: years are counted from March, so that leap

@@ -13,6 +13,7 @@
 pub mod choice;
 pub mod curve;
 mod machine;
+pub mod paper;
 mod race;
 mod samples;
 pub mod scale;
@@ -103,6 +104,8 @@ struct Run {
     warm: f64,
     /// Bytes of trees at the end.
     tree_bytes: usize,
+    /// Cells of trees looked at, cold and warm.
+    cells: u64,
 }
 
 /// Projects the views cold and warm.
@@ -118,7 +121,8 @@ fn run(scene: &mut Scene, method: Method, views: &[View], control: &Control) -> 
     let start = Instant::now();
     project()?;
     let warm = start.elapsed().as_secs_f64();
-    Ok(Run { cold, warm, tree_bytes: projector.forest().map_or(0, |forest| forest.tree_bytes) })
+    let forest = projector.forest().unwrap_or_default();
+    Ok(Run { cold, warm, tree_bytes: forest.tree_bytes, cells: forest.build.cells() })
 }
 
 /// The program, as reports name it.
@@ -133,4 +137,15 @@ pub struct Program {
 impl Program {
     /// This one.
     pub const THIS: Self = Self { program: "chordfield", version: env!("CARGO_PKG_VERSION") };
+}
+
+/// A number to two digits.
+fn two_digits(value: f64) -> String {
+    digits(value, 2)
+}
+
+/// A number to so many digits, none of them a power of ten's.
+fn digits(value: f64, count: i32) -> String {
+    let decimals = (count - 1 - value.abs().max(1e-9).log10().floor() as i32).clamp(0, 9);
+    format!("{value:.*}", decimals as usize)
 }

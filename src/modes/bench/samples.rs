@@ -22,8 +22,12 @@ impl Samples {
 
     /// How many times as long as `other` it took: the median over the rounds both took part in, whose drift they share.
     pub fn ratio_to(&self, other: &Self) -> f64 {
-        let ratios: Vec<f64> = self.0.iter().zip(&other.0).map(|(a, b)| a / b).collect();
-        quantile(&ratios, 0.5)
+        self.ratios_to(other).median()
+    }
+
+    /// The ratio of each round.
+    pub fn ratios_to(&self, other: &Self) -> Self {
+        Self(self.0.iter().zip(&other.0).map(|(a, b)| a / b).collect())
     }
 
     /// Summed up.

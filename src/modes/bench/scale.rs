@@ -30,12 +30,19 @@ use plan::{PLANS, Plan};
 const END_OF_PATIENCE_S: f64 = 60.0;
 
 /// How far the studies go.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ScaleSettings {
     /// How long each point may take.
     pub patience: Patience,
     /// Only the first points of each study.
     pub quick: bool,
+    /// The studies to run, by their [names](study_names); all if none is named.
+    pub studies: Vec<String>,
+}
+
+/// What the studies are called.
+pub fn study_names() -> impl Iterator<Item = &'static str> {
+    PLANS.iter().map(Plan::short_name)
 }
 
 /// What was found.
@@ -85,6 +92,8 @@ pub struct ScaleRow {
     pub scene_bytes: Option<u64>,
     /// Bytes of trees after the views.
     pub tree_bytes: usize,
+    /// Cells of trees looked at, cold and warm: where the cache is too small, the same ones again.
+    pub tree_cells: u64,
 }
 
 /// A straight line through logarithms.
@@ -115,6 +124,9 @@ pub fn turns(settings: &ScaleSettings) -> u64 {
 }
 
 fn sizes(plan: &Plan, settings: &ScaleSettings) -> Vec<u32> {
+    if !settings.studies.is_empty() && !settings.studies.iter().any(|name| name == plan.short_name()) {
+        return Vec::new();
+    }
     let count = if settings.quick { plan.quick_sizes } else { plan.sizes.len() };
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let is_there = |&&size: &&u32| plan.threads.is_none_or(|threads| threads(size) <= cores);
@@ -164,18 +176,20 @@ fn measure(plan: &Plan, settings: &ScaleSettings, control: &Control, study: &mut
         let scene_bytes = held_bytes().zip(held).and_then(|(now, before)| now.checked_sub(before));
         let views: Vec<View> = scene.beam.views()?;
         let contenders = (plan.contenders)(size);
-        let mut bytes = vec![0; contenders.len()];
+        let mut trees = vec![(0, 0); contenders.len()];
         let pool = plan.threads.map(|threads| pool(threads(size))).transpose()?;
         let results = race(contenders.len(), settings.patience, control, |i| {
             let mut once = || run(&mut scene, contenders[i].method, &views, control);
-            let Run { cold, warm, tree_bytes } = match &pool {
+            let Run { cold, warm, tree_bytes, cells } = match &pool {
                 Some(pool) => pool.install(once),
                 None => once(),
             }?;
-            bytes[i] = tree_bytes;
+            trees[i] = (tree_bytes, cells);
             Ok([cold, warm])
         })?;
-        for ((contender, [cold, warm]), tree_bytes) in contenders.iter().zip(&results.times).zip(bytes) {
+        for ((contender, [cold, warm]), (tree_bytes, tree_cells)) in
+            contenders.iter().zip(&results.times).zip(trees)
+        {
             if !cold.0.is_empty() {
                 study.rows.push(ScaleRow {
                     size: (plan.measure)(size),
@@ -185,6 +199,7 @@ fn measure(plan: &Plan, settings: &ScaleSettings, control: &Control, study: &mut
                     load_s,
                     scene_bytes,
                     tree_bytes,
+                    tree_cells,
                 });
             }
         }
@@ -265,6 +280,7 @@ mod tests {
             load_s: 1.0,
             scene_bytes: Some((size * 1e7) as u64),
             tree_bytes: 0,
+            tree_cells: 0,
         }
     }
 

@@ -39,7 +39,7 @@ const TAYLOR: [f64; 14] = [
 /// Takes photons, the share of each bin that is `left`, along `length_mm` of an organ; returns the energy that they lose there,
 /// and that which is absorbed there, keV.
 pub fn pass(optics: &Optics, organ: &OrganOptics, length_mm: f64, left: &mut [f64]) -> (f64, f64) {
-    pulp::Arch::new().dispatch(Pass { optics, organ, length_mm, left })
+    crate::dispatch::arch().dispatch(Pass { optics, organ, length_mm, left })
 }
 
 struct Pass<'a> {

@@ -78,9 +78,7 @@ impl Method {
     pub fn for_views(self, views: &[View]) -> Self {
         match self {
             Self::Auto(trees) if trees.demand.is_some() => {
-                let pixels = views.iter().map(View::pixels).sum();
-                let demand = Some(Demand { views: views.len() as u64, pixels });
-                Self::Auto(TreeSettings { demand, ..trees })
+                Self::Auto(TreeSettings { demand: Some(Demand::of(views)), ..trees })
             }
             other => other,
         }

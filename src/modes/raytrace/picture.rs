@@ -75,6 +75,13 @@ pub struct Samples {
     seed: Option<u64>,
 }
 
+/// One ray, through the middle.
+impl Default for Samples {
+    fn default() -> Self {
+        Self { side: 1, seed: None }
+    }
+}
+
 impl Samples {
     /// `count` rays per pixel on a regular lattice or, with a seed, one at random in each of its cells. `None` unless the
     /// count is the square of 1 to 16.

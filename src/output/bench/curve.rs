@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{Named, TIMES, machine, seconds, times};
+use super::{COLD_AND_WARM, Named, TIMES, machine, seconds, times};
 use crate::modes::bench::curve::{CurveReport, CurveRow};
 use crate::modes::bench::{EXACT_BELOW_MM, Times};
 use crate::output::page::curves::{Axis, COLOURS, Curve, Curves, Point, Spacing};
@@ -104,7 +104,12 @@ fn page(report: &CurveReport) -> String {
     document(
         &format!("Error against time: {}", report.scene),
         &[
-            ("", recommendation + &machine(&report.machine, &report.command, report.complete) + &what),
+            (
+                "",
+                recommendation
+                    + &machine(&report.machine, &report.command, report.complete, COLD_AND_WARM)
+                    + &what,
+            ),
             ("Curves", plots),
             ("Figures", rows(report)),
             ("Left out", left_out),

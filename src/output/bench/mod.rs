@@ -1,14 +1,15 @@
 //! The files of a benchmark: a page to look at, plots, and all figures as JSON and CSV.
 //!
-//! | `bench curve` | `bench scale` | `bench choice` | content |
-//! |---|---|---|---|
-//! | `curve.html` | `scale.html` | `choice.html` | the report: one file, no network, no script |
-//! | `curve.csv` | `scale.csv` | `choice.csv` | a row for each method, setting and size |
-//! | `curve-cold.svg`, `curve-warm.svg` | `scale-faces.svg` … | | its plots |
-//! | `curve.json` | `scale.json` | `choice.json` | all figures; written last, so a folder without it holds an unfinished run |
+//! | `bench curve` | `bench scale` | `bench paper` | `bench choice` | content |
+//! |---|---|---|---|---|
+//! | `curve.html` | `scale.html` | `paper.html` | `choice.html` | the report: one file, no network, no script |
+//! | `curve.csv` | `scale.csv` | `paper.csv` | `choice.csv` | a row for each method, setting and size |
+//! | `curve-cold.svg`, `curve-warm.svg` | `scale-faces.svg` … | `paper-tomatoes-distance-error.svg` … | | its plots |
+//! | `curve.json` | `scale.json` | `paper.json` | `choice.json` | all figures; written last, so a folder without it holds an unfinished run |
 
 mod choice;
 mod curve;
+mod paper;
 mod scale;
 
 use std::path::Path;
@@ -21,6 +22,7 @@ use crate::error::Result;
 
 use crate::modes::bench::choice::ChoiceReport;
 use crate::modes::bench::curve::CurveReport;
+use crate::modes::bench::paper::PaperReport;
 use crate::modes::bench::scale::ScaleReport;
 use crate::modes::bench::{Machine, Times};
 
@@ -53,6 +55,14 @@ pub fn choice_table(report: &ChoiceReport) -> String {
     choice::table(report)
 }
 
+/// Writes the files of the paper's tables and figures into `folder`, which is made if missing.
+///
+/// # Errors
+/// The first file that cannot be written. Files are whole or absent.
+pub fn write_paper(folder: &Path, report: &PaperReport) -> Result<()> {
+    write(folder, "paper", &paper::files(report), report)
+}
+
 /// The table of an error–time curve as text.
 pub fn curve_table(report: &CurveReport) -> String {
     curve::table(report)
@@ -61,6 +71,11 @@ pub fn curve_table(report: &CurveReport) -> String {
 /// The tables of studies of scale as text.
 pub fn scale_table(report: &ScaleReport) -> String {
     scale::table(report)
+}
+
+/// The paper's tables and ours as text.
+pub fn paper_table(report: &PaperReport) -> String {
+    paper::table(report)
 }
 
 /// A file's name and its text.
@@ -77,15 +92,18 @@ fn write(folder: &Path, name: &str, files: &[Named], report: &impl Serialize) ->
     Ok(())
 }
 
-/// Where and how times were measured, and by which command.
-fn machine(machine: &Machine, command: &str, complete: bool) -> String {
+/// What cold and warm mean in a table of methods.
+const COLD_AND_WARM: &str = "<i>cold</i> is from the scene as read to the last length, with all trees and tables, <i>warm</i> \
+                             the same views again";
+
+/// Where and how times were measured, and by which command; `terms` says what is told in words of its own.
+fn machine(machine: &Machine, command: &str, complete: bool, terms: &str) -> String {
     let build =
         if machine.optimized { "" } else { " <b>Built with debug assertions: times mean little.</b>" };
     let partial = if complete { "" } else { "<p><b>Interrupted: this is what was measured before.</b></p>" };
     format!(
         "<p class=\"lead\">{}, {} of {} cores, {}, {} instructions, {}.{build} Times are medians of rounds in which all \
-         take turns, after one to warm up; <i>cold</i> is from the scene as read to the last length, with all trees and \
-         tables, <i>warm</i> the same views again.</p><p class=\"command\"><code>{}</code></p>{partial}",
+         take turns, after one to warm up; {terms}.</p><p class=\"command\"><code>{}</code></p>{partial}",
         escape(&machine.processor),
         machine.threads,
         machine.cores,

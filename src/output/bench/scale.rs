@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 
-use super::{Named, TIMES, machine, seconds, times};
+use super::{COLD_AND_WARM, Named, TIMES, machine, seconds, times};
 use crate::modes::bench::scale::{Fit, ScaleReport, ScaleRow, Study, methods};
 use crate::output::page::curves::{Axis, COLOURS, Curve, Curves, Point, Spacing};
-use crate::output::page::{document, escape, short};
+use crate::output::page::{document, escape, grouped, short};
 
 pub fn files(report: &ScaleReport) -> Vec<Named> {
     let mut files = vec![("scale.html".into(), page(report)), ("scale.csv".into(), csv(report))];
@@ -54,7 +54,7 @@ fn plot(study: &Study) -> Curves<'_> {
 }
 
 fn page(report: &ScaleReport) -> String {
-    let mut sections = vec![("", machine(&report.machine, &report.command, report.complete))];
+    let mut sections = vec![("", machine(&report.machine, &report.command, report.complete, COLD_AND_WARM))];
     for study in &report.studies {
         sections.push((study.name, section(study)));
     }
@@ -64,19 +64,22 @@ fn page(report: &ScaleReport) -> String {
 fn section(study: &Study) -> String {
     let row = |row: &ScaleRow| {
         format!(
-            "<tr><td>{}</td><th><code>{}</code></th><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+            "<tr><td>{}</td><th><code>{}</code></th><td>{}</td><td>{}</td><td>{}</td><td>{}</td>\
+             <td>{}</td></tr>",
             short(row.size),
             row.options,
             seconds(&row.cold),
             seconds(&row.warm),
             short(row.load_s),
-            short(row.tree_bytes as f64 / 1e6)
+            short(row.tree_bytes as f64 / 1e6),
+            grouped(row.tree_cells),
         )
     };
     let rows: String = study.rows.iter().map(row).collect();
     format!(
         "<p>{}. Drawn through: cold; dashed: warm.</p>{}{}<details><summary>All figures</summary><div class=\"wide\"><table><thead><tr><th>{}</th><th>method</th>\
-         <th>cold, s</th><th>warm, s</th><th>reading the scene, s</th><th>trees, MB</th></tr></thead><tbody>{rows}</tbody></table></div></details>",
+         <th>cold, s</th><th>warm, s</th><th>reading the scene, s</th><th>trees, MB</th><th>cells looked at</th></tr></thead>\
+         <tbody>{rows}</tbody></table></div></details>",
         escape(&study.setup),
         plot(study).html(),
         fits(study),
@@ -108,12 +111,12 @@ fn fits(study: &Study) -> String {
 }
 
 fn csv(report: &ScaleReport) -> String {
-    let mut text = format!("study,size,options,{TIMES},load_s,scene_bytes,tree_bytes\n");
+    let mut text = format!("study,size,options,{TIMES},load_s,scene_bytes,tree_bytes,tree_cells\n");
     for study in &report.studies {
         for row in &study.rows {
             let _ = writeln!(
                 text,
-                "\"{}\",{},{},{},{},{},{}",
+                "\"{}\",{},{},{},{},{},{},{}",
                 study.name,
                 row.size,
                 row.options,
@@ -121,6 +124,7 @@ fn csv(report: &ScaleReport) -> String {
                 row.load_s,
                 row.scene_bytes.map(|b| b.to_string()).unwrap_or_default(),
                 row.tree_bytes,
+                row.tree_cells,
             );
         }
     }
@@ -133,9 +137,13 @@ pub fn table(report: &ScaleReport) -> String {
     for study in &report.studies {
         let _ = writeln!(text, "{}: {}", study.name, study.setup);
         for row in &study.rows {
+            let cells = match row.tree_cells {
+                0 => String::new(),
+                cells => format!("{cells:>12} cells"),
+            };
             let _ = writeln!(
                 text,
-                "{:>10}  {:44}{:>10} s cold{:>10} s warm",
+                "{:>10}  {:44}{:>10} s cold{:>10} s warm{cells}",
                 short(row.size),
                 row.options,
                 seconds(&row.cold),
@@ -143,8 +151,11 @@ pub fn table(report: &ScaleReport) -> String {
             );
         }
         for fit in &study.fits {
-            let end =
-                fit.size_at_a_minute.map_or(String::new(), |size| format!("; a minute at {}", short(size)));
+            let ends = [("a minute", fit.size_at_a_minute), ("memory full", fit.size_at_full_memory)];
+            let end = |(what, size): (&str, Option<f64>)| {
+                size.map_or(String::new(), |size| format!("; {what} at {}", short(size)))
+            };
+            let end: String = ends.into_iter().map(end).collect();
             let _ = writeln!(
                 text,
                 "            {:44}∝ size^{:.2} cold, ^{:.2} warm{end}",

@@ -54,6 +54,8 @@ pub struct Point {
 pub enum Spacing {
     /// Equal steps for equal differences, from zero or the least value.
     Linear,
+    /// Equal steps for equal differences, from the least value to the greatest.
+    Between,
     /// Equal steps for equal ratios; only positive values show.
     Logarithmic,
 }
@@ -120,7 +122,8 @@ impl Curves<'_> {
     }
 
     fn svg(&self, extra: &str) -> String {
-        let can_show = |axis: &Axis, v: f64| v.is_finite() && (axis.spacing == Spacing::Linear || v > 0.0);
+        let can_show =
+            |axis: &Axis, v: f64| v.is_finite() && (axis.spacing != Spacing::Logarithmic || v > 0.0);
         let shown = |c: &Curve| -> Vec<Point> {
             c.points
                 .iter()
@@ -229,6 +232,11 @@ impl Scale {
                 let low = least.min(0.0);
                 [low, if most > low { low + 1.05 * (most - low) } else { low + 1.0 }]
             }
+            Spacing::Between => {
+                // A single value has room around it, too.
+                let room = if most > least { 0.03 * (most - least) } else { 1.0 };
+                [least - room, most + room]
+            }
             Spacing::Logarithmic => {
                 let [low, high] = [least.log10() - 0.08, most.log10() + 0.08];
                 // A single value still has room around it.
@@ -239,7 +247,7 @@ impl Scale {
     }
 
     fn at(&self, value: f64) -> f64 {
-        let value = if self.spacing == Spacing::Linear { value } else { value.log10() };
+        let value = if self.spacing == Spacing::Logarithmic { value.log10() } else { value };
         let share = (value - self.range[0]) / (self.range[1] - self.range[0]);
         self.place[0] + share * (self.place[1] - self.place[0])
     }
@@ -247,7 +255,7 @@ impl Scale {
     /// Round values on the axis.
     fn ticks(&self) -> Vec<f64> {
         let [low, high] = self.range;
-        if self.spacing == Spacing::Linear {
+        if self.spacing != Spacing::Logarithmic {
             let step = round_step((high - low) / MOST_TICKS);
             let first = (low / step).ceil() as i64;
             return (first..).map(|i| i as f64 * step).take_while(|&t| t <= high).collect();
@@ -305,7 +313,7 @@ mod tests {
 
     #[test]
     fn greater_is_further_right_and_further_up() {
-        for spacing in [Spacing::Linear, Spacing::Logarithmic] {
+        for spacing in [Spacing::Linear, Spacing::Between, Spacing::Logarithmic] {
             let x = Scale::new(spacing, [0.5, 80.0].into_iter(), [10.0, 20.0]).expect("values");
             assert!(x.at(0.5) < x.at(3.0) && x.at(3.0) < x.at(80.0), "{spacing:?}");
             assert!(x.at(80.0) <= 20.0 && x.at(0.5) >= 10.0);
@@ -321,6 +329,7 @@ mod tests {
             scale.ticks().into_iter().map(tick_name).collect()
         };
         assert_eq!(ticks(Spacing::Linear, [0.0, 0.9]), ["0", "0.2", "0.4", "0.6", "0.8"]);
+        assert_eq!(ticks(Spacing::Between, [22.0, 30.0]), ["22", "24", "26", "28", "30"]);
         assert_eq!(ticks(Spacing::Logarithmic, [0.9, 11.0]), ["1", "2", "5", "10"]);
         assert_eq!(ticks(Spacing::Logarithmic, [1e-6, 20.0]).first().map(String::as_str), Some("1e-6"));
     }

@@ -1,6 +1,7 @@
 //! Which of what was measured nothing beats, and what to use.
 
 use super::{CurveReport, CurveRow};
+use crate::modes::bench::two_digits;
 
 /// The mean error that counts: none where it is rounding.
 fn weight(row: &CurveRow) -> f64 {
@@ -39,7 +40,7 @@ pub fn recommendation(report: &CurveReport) -> Option<String> {
         pixels[0],
         pixels[1],
         best.options,
-        seconds(best.cold.seconds)
+        two_digits(best.cold.seconds)
     );
     let best_warm = quickest(|row| row.warm.seconds, &exact)?;
     let rivals = [
@@ -56,17 +57,11 @@ pub fn recommendation(report: &CurveReport) -> Option<String> {
             Some(row) => format!(
                 "; {when}, `{}` takes {} s with errors of {} mm on average and {} mm in 99.9 % of lengths",
                 row.options,
-                seconds(time(row)),
-                seconds(row.error_mm.mean),
-                seconds(row.error_mm.p999)
+                two_digits(time(row)),
+                two_digits(row.error_mm.mean),
+                two_digits(row.error_mm.p999)
             ),
         };
     }
     Some(text + ".")
-}
-
-/// A number to two digits.
-fn seconds(value: f64) -> String {
-    let decimals = (1 - value.abs().max(1e-9).log10().floor() as i32).clamp(0, 9);
-    format!("{value:.*}", decimals as usize)
 }

@@ -20,6 +20,13 @@ pub struct Plan {
     pub is_fitted: bool,
 }
 
+impl Plan {
+    /// The name without its unit.
+    pub fn short_name(&self) -> &'static str {
+        self.name.split(',').next().unwrap_or(self.name)
+    }
+}
+
 /// The studies, as the table of the parent module has them.
 pub const PLANS: [Plan; 6] = [
     Plan {

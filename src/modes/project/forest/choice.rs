@@ -1,7 +1,7 @@
 //! Which organs are put in trees, if the method is to choose: those for which a small model of costs says that a tree is the
 //! quicker for what the study asks.
 //!
-//! The exact side is the engines' own estimate, see [`Body::cheapest_for_image`]; that of a tree is
+//! The exact side is the engines' own estimate, see [`Body::image_cost`]; that of a tree is
 //!
 //! | for each | is paid for |
 //! |---|---|
@@ -14,15 +14,31 @@
 use serde::Serialize;
 
 use super::{DEFAULT_TOLERANCE_MM, Interpolation, TreeSettings};
-use crate::exact::{Body, Engine};
+use crate::exact::{Body, Engine, ImageCost};
+use crate::geometry::RayGrid;
+use crate::scene::View;
 
-/// What a study asks of its organs: views of so many pixels.
+/// What a study asks of its organs: so many views like one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Demand {
     /// Views.
     pub views: u64,
     /// Pixels of all views.
     pub pixels: u64,
+    /// The rays of the view that stands for all. `None` if there are no views.
+    #[serde(skip)]
+    pub grid: Option<RayGrid>,
+}
+
+impl Demand {
+    /// That of a study of these views, of which the first stands for all.
+    pub fn of(views: &[View]) -> Self {
+        Self {
+            views: views.len() as u64,
+            pixels: views.iter().map(View::pixels).sum(),
+            grid: views.first().map(|view| *view.rays()),
+        }
+    }
 }
 
 /// What an organ is estimated to take, which decides how it is found.
@@ -30,14 +46,14 @@ pub struct Demand {
 pub struct Estimate {
     /// The quickest exact engine.
     pub engine: Engine,
-    /// By that engine, seconds.
+    /// By that engine, seconds of one thread.
     pub exact_s: f64,
-    /// By a tree, grown from nothing, seconds.
+    /// By a tree, grown from nothing, seconds of one thread.
     pub tree_s: f64,
 }
 
-/// Nanoseconds, in the measure of the engines' estimates: from times of `project` on ellipsoids of 20 048 and 200 432 faces at
-/// a tolerance of half a millimetre, one view of 600 × 600 and eight of 2048 × 2048, cold and warm.
+/// Nanoseconds of one thread: from times of ellipsoids of 20 480 and 327 680 faces, one view of 600 × 600 and one of 2048 × 2048, cold
+/// and warm (`cargo bench --bench trees` in `benches`), at the loosest tolerance that errs by a thousandth of the mean chord.
 mod cost {
     /// To make the walker's tables, for each face of a body that the processor's cache holds.
     pub const FACE: f64 = 170.0;
@@ -46,17 +62,15 @@ mod cost {
     /// From so many faces on.
     pub const FAR: f64 = 50_000.0;
     /// To grow what the first view asks.
-    pub const GROWTH: f64 = 1.5e6;
+    pub const GROWTH: f64 = 2.1e6;
     /// To make the body ready for a view.
-    pub const VIEW: f64 = 0.6e6;
-    /// To evaluate leaves, for each pixel of a view.
-    pub const PIXEL: f64 = 4.1;
-    /// To trace one that leaves do not know.
-    pub const TRACED_PIXEL: f64 = 100.0;
+    pub const VIEW: f64 = 0.5e6;
+    /// To evaluate leaves, for each pixel of the body's rectangle.
+    pub const PIXEL: f64 = 2.7;
 }
 
-/// Of a view's pixels, so many meet the body.
-const MET: f64 = 0.4;
+/// Of the pixels of its rectangle, a round body meets so many.
+const MET: f64 = std::f64::consts::FRAC_PI_4;
 
 /// Facets of a body of F faces and radius r are off a smooth surface by some r/F; leaves that are to be within a tolerance of
 /// them do not know the lines whose chord is shorter than this times r/F over the tolerance, in longest chords.
@@ -68,15 +82,19 @@ const DOUBT: f64 = 1.1;
 impl Estimate {
     /// For an organ in a study.
     pub fn of(body: &Body, trees: &TreeSettings, demand: Demand) -> Self {
-        let views = demand.views.max(1);
-        let (engine, exact_ns) = body.cheapest_for_image(demand.pixels / views);
-        let exact_s = 1e-9 * exact_ns * demand.views as f64;
+        let Some(grid) = &demand.grid else {
+            // Single rays, of which no tree is known to make up for its growth.
+            return Self { engine: body.engine_for_rays(), exact_s: 0.0, tree_s: f64::INFINITY };
+        };
+        let image = body.image_cost(grid);
         let tree_s = match trees.interpolation {
-            Interpolation::SquaredChord { tolerance_mm } => 1e-9 * tree_ns(body, tolerance_mm, demand),
+            Interpolation::SquaredChord { tolerance_mm } => {
+                1e-9 * tree_ns(body, &image, tolerance_mm, demand.views as f64)
+            }
             // The paper's trees are never the quicker.
             Interpolation::Quadrilinear { .. } => f64::INFINITY,
         };
-        Self { engine, exact_s, tree_s }
+        Self { engine: image.engine, exact_s: 1e-9 * image.ns * demand.views as f64, tree_s }
     }
 
     /// Whether the tree is the quicker.
@@ -85,19 +103,17 @@ impl Estimate {
     }
 }
 
-fn tree_ns(body: &Body, tolerance_mm: f64, demand: Demand) -> f64 {
+fn tree_ns(body: &Body, image: &ImageCost, tolerance_mm: f64, views: f64) -> f64 {
     let faces = body.surface().mesh().faces.len() as f64;
     let radius = body.bounds().size().element_sum() / 6.0;
     // Lines are spread evenly over squared chords.
     let traced = (FACETS * radius / (faces * tolerance_mm)).powi(2).min(1.0);
-    // Twice as fine an error takes cells 2^¼ as wide, of which a view meets the square of that more; later views meet many of
-    // the first one's.
-    let leaves = (demand.views as f64).sqrt() * (DEFAULT_TOLERANCE_MM / tolerance_mm).sqrt();
+    // Half the error takes cells 2^¼ times as small, of which a view meets √2 times as many; later views meet many of the first
+    // one's.
+    let leaves = views.sqrt() * (DEFAULT_TOLERANCE_MM / tolerance_mm).sqrt();
     let face = if faces < cost::FAR { cost::FACE } else { cost::FAR_FACE };
-    faces * face
-        + leaves * cost::GROWTH
-        + demand.views as f64 * cost::VIEW
-        + demand.pixels as f64 * (cost::PIXEL + MET * traced * cost::TRACED_PIXEL)
+    let of_view = cost::VIEW + image.pixels * (cost::PIXEL + MET * traced * image.walked_pixel_ns);
+    faces * face + leaves * cost::GROWTH + views * of_view
 }
 
 #[cfg(test)]
@@ -105,22 +121,27 @@ mod tests {
     use super::*;
     use crate::geometry::ClosedMesh;
     use crate::geometry::primitives::icosphere;
+    use crate::scene::Scene;
 
     #[test]
-    fn trees_are_for_many_faces_many_pixels_and_tolerances_that_facets_allow() {
+    fn trees_are_for_many_faces_many_views_and_tolerances_that_facets_allow() {
         let body = |subdivisions| {
             let mesh = icosphere(subdivisions).map_vertices(|v| v * glam::DVec3::new(98.0, 78.0, 58.0));
             Body::new(ClosedMesh::new(mesh).expect("closed").0)
         };
-        let [few, many] = [body(2), body(5)];
-        let prefers = |body: &Body, tolerance_mm: f64, views: u64| {
+        let [few, many] = [body(2), body(6)];
+        let views = Scene::phantom("calibration").expect("a scene").beam.views().expect("views");
+        let prefers = |body: &Body, tolerance_mm: f64, count: u64| {
             let interpolation = Interpolation::SquaredChord { tolerance_mm };
             let trees = TreeSettings { interpolation, ..TreeSettings::default() };
-            Estimate::of(body, &trees, Demand { views, pixels: views * 600 * 600 }).prefers_tree()
+            let demand = Demand { views: count, ..Demand::of(&views) };
+            Estimate::of(body, &trees, demand).prefers_tree()
         };
-        assert!(prefers(&many, 0.5, 64), "measured: 139 ms in place of 198");
-        assert!(!prefers(&many, 0.5, 1), "measured: 7 ms in place of 3.2");
+        assert!(prefers(&many, 0.5, 64));
+        assert!(!prefers(&many, 0.5, 1), "the walker's tables take longer than the view");
         assert!(!prefers(&many, 0.02, 64), "its facets are rougher than that");
-        assert!(!prefers(&few, 0.5, 64) && !prefers(&few, 0.5, 0));
+        assert!(!prefers(&few, 0.5, 64), "so are these");
+        let none = Estimate::of(&many, &TreeSettings::default(), Demand::default());
+        assert!(!none.prefers_tree(), "nothing is asked");
     }
 }

@@ -1,0 +1,265 @@
+//! How a patch of faces is seen: its points' places, and what follows from them for each face. Found anew for each block of
+//! pixels, as that takes less time than to keep and to fetch it.
+//!
+//! All is done for as many faces at a time as the machine's instructions take: one list for each number of a face.
+
+use super::face::{Care, Slope, greater, lesser};
+use super::patches::{MOST_FACES, MOST_POINTS, Patch};
+use super::pixels::Pixels;
+use super::projection::{Place, Projection};
+use super::round;
+
+/// As many as a byte can number.
+const POINTS: usize = 256;
+const _: () = assert!(MOST_POINTS <= POINTS);
+
+/// A number of each face.
+type OfFaces = [f64; MOST_FACES];
+
+/// An edge of a face, in columns and rows from the least that have any part in the face.
+#[derive(Clone, Copy)]
+pub struct Edge {
+    /// Where it starts.
+    pub from: [f64; 2],
+    /// Where it leads, so turned that the face is on the side of greater columns if it leads to greater rows.
+    pub along: [f64; 2],
+}
+
+/// One patch in the image.
+pub struct Aspect {
+    /// Columns, rows and depths of the points.
+    points: [[f64; POINTS]; 3],
+    /// The same of each face's corners.
+    corners: [[OfFaces; 3]; 3],
+    /// Ceilings of the corners' columns and rows: the least and the greatest.
+    low: [OfFaces; 2],
+    high: [OfFaces; 2],
+    /// Slopes of depth by column and by row.
+    slopes: [OfFaces; 2],
+    /// Depths that crossings are kept between.
+    lowest: OfFaces,
+    highest: OfFaces,
+    /// Twice the areas, in pixels.
+    areas: OfFaces,
+    /// See [`Edge`]: of each edge's start and direction, in columns and rows.
+    from: [[OfFaces; 2]; 3],
+    along: [[OfFaces; 2]; 3],
+    /// Whether the slopes are right.
+    is_sure: [bool; MOST_FACES],
+    is_near: [bool; MOST_FACES],
+    /// Faces that may cover pixels of the block: the first so many.
+    near: [u8; MOST_FACES],
+    near_count: usize,
+}
+
+impl Default for Aspect {
+    fn default() -> Self {
+        const NONE: OfFaces = [0.0; MOST_FACES];
+        Self {
+            points: [[0.0; POINTS]; 3],
+            corners: [[NONE; 3]; 3],
+            low: [NONE; 2],
+            high: [NONE; 2],
+            slopes: [NONE; 2],
+            lowest: NONE,
+            highest: NONE,
+            areas: NONE,
+            from: [[NONE; 2]; 3],
+            along: [[NONE; 2]; 3],
+            is_sure: [false; MOST_FACES],
+            is_near: [false; MOST_FACES],
+            near: [0; MOST_FACES],
+            near_count: 0,
+        }
+    }
+}
+
+impl Aspect {
+    /// Finds the places of a patch's points; they may stand there already.
+    #[inline(always)]
+    pub fn place_points(&mut self, patch: &Patch, projection: &Projection, are_places: bool) {
+        let count = patch.points[0].len();
+        let [x, y, depth] = self.points.each_mut().map(|of| &mut of[..count]);
+        let [px, py, pz] = patch.points.map(|points| &points[..count]);
+        if are_places {
+            x.copy_from_slice(px);
+            y.copy_from_slice(py);
+            depth.copy_from_slice(pz);
+        } else if projection.is_cone() {
+            project::<true>(projection, [px, py, pz], [x, y, depth]);
+        } else {
+            project::<false>(projection, [px, py, pz], [x, y, depth]);
+        }
+    }
+
+    /// Looks at the faces of the patch whose points have places, and lists those that may cover pixels of a block.
+    #[inline(always)]
+    pub fn look_at_faces(&mut self, patch: &Patch, block: &Pixels, care: Care, limits: [f64; 2]) {
+        for (face, corners) in patch.corners.iter().enumerate() {
+            for (of_corner, &point) in self.corners.iter_mut().zip(corners) {
+                for (of, points) in of_corner.iter_mut().zip(&self.points) {
+                    of[face] = points[point as usize];
+                }
+            }
+        }
+        self.find_boxes(block);
+        self.find_slopes(care, limits);
+        self.find_edges();
+        self.near_count = 0;
+        for face in 0..patch.corners.len() {
+            self.near[self.near_count] = face as u8;
+            self.near_count += usize::from(self.is_near[face]);
+        }
+    }
+
+    #[inline(always)]
+    fn find_boxes(&mut self, block: &Pixels) {
+        let [[ax, ay, _], [bx, by, _], [cx, cy, _]] = &self.corners;
+        for (axis, [a, b, c]) in [[ax, bx, cx], [ay, by, cy]].into_iter().enumerate() {
+            let (low, high) = (&mut self.low[axis], &mut self.high[axis]);
+            for i in 0..MOST_FACES {
+                let [a, b, c] = [a[i], b[i], c[i]].map(round::ceiling);
+                low[i] = lesser(a, lesser(b, c));
+                high[i] = greater(a, greater(b, c));
+            }
+        }
+        let [left, right, top, bottom] =
+            [block.columns.start, block.columns.end, block.rows.start, block.rows.end].map(f64::from);
+        let ([low_column, low_row], [high_column, high_row]) = (&self.low, &self.high);
+        for i in 0..MOST_FACES {
+            let columns = greater(low_column[i], left) < lesser(high_column[i], right);
+            let rows = greater(low_row[i], top) < lesser(high_row[i], bottom);
+            self.is_near[i] = columns & rows;
+        }
+    }
+
+    #[inline(always)]
+    fn find_slopes(&mut self, care: Care, limits: [f64; 2]) {
+        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = &self.corners;
+        let [per_column, per_row] = &mut self.slopes;
+        for i in 0..MOST_FACES {
+            let a = Place { x: ax[i], y: ay[i], depth: az[i] };
+            let b = Place { x: bx[i], y: by[i], depth: bz[i] };
+            let c = Place { x: cx[i], y: cy[i], depth: cz[i] };
+            let (slope, is_sure) = Slope::new([&a, &b, &c], care, limits);
+            per_column[i] = slope.per_column;
+            per_row[i] = slope.per_row;
+            self.lowest[i] = slope.lowest;
+            self.highest[i] = slope.highest;
+            self.areas[i] = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y);
+            self.is_sure[i] = is_sure;
+        }
+    }
+
+    #[inline(always)]
+    fn find_edges(&mut self) {
+        for edge in 0..3 {
+            let (start, end) = (&self.corners[edge], &self.corners[(edge + 1) % 3]);
+            for axis in 0..2 {
+                let (from, along) = (&mut self.from[edge][axis], &mut self.along[edge][axis]);
+                for i in 0..MOST_FACES {
+                    let sign = if self.areas[i] > 0.0 { 1.0 } else { -1.0 };
+                    from[i] = start[axis][i] - self.low[axis][i];
+                    along[i] = sign * (end[axis][i] - start[axis][i]);
+                }
+            }
+        }
+    }
+
+    /// How many faces may cover pixels of the block.
+    #[inline(always)]
+    pub fn near_count(&self) -> usize {
+        self.near_count
+    }
+
+    /// One of them.
+    #[inline(always)]
+    pub fn near(&self, i: usize) -> usize {
+        self.near[i] as usize
+    }
+
+    /// The edges of a face, from corner to corner.
+    #[inline(always)]
+    pub fn edges(&self, face: usize) -> [Edge; 3] {
+        let of = |edge: usize, of: &[[OfFaces; 2]; 3]| [of[edge][0][face], of[edge][1][face]];
+        [0, 1, 2].map(|edge| Edge { from: of(edge, &self.from), along: of(edge, &self.along) })
+    }
+
+    /// The places of some point.
+    #[inline(always)]
+    pub fn place_of_point(&self, point: u8) -> Place {
+        let [x, y, depth] = self.points.each_ref().map(|of| of[point as usize]);
+        Place { x, y, depth }
+    }
+
+    /// The place of a face's corner.
+    #[inline(always)]
+    pub fn corner(&self, face: usize, corner: usize) -> Place {
+        let [x, y, depth] = self.corners[corner].each_ref().map(|of| of[face]);
+        Place { x, y, depth }
+    }
+
+    /// A face's slope.
+    #[inline(always)]
+    pub fn slope(&self, face: usize) -> Slope {
+        let [per_column, per_row] = self.slopes.each_ref().map(|of| of[face]);
+        let (lowest, highest) = (self.lowest[face], self.highest[face]);
+        Slope { base: self.corner(face, 0), per_column, per_row, lowest, highest }
+    }
+
+    /// Whether that is right.
+    #[inline(always)]
+    pub fn is_sure(&self, face: usize) -> bool {
+        self.is_sure[face]
+    }
+
+    /// Twice the area of a face, in pixels, positive if its corners turn from columns to rows.
+    #[inline(always)]
+    pub fn area(&self, face: usize) -> f64 {
+        self.areas[face]
+    }
+
+    /// The pixels in whose columns and rows a face may cover any.
+    #[inline(always)]
+    pub fn pixels(&self, face: usize) -> Pixels {
+        let range = |axis: usize| self.low[axis][face] as i32..self.high[axis][face] as i32;
+        Pixels { columns: range(0), rows: range(1) }
+    }
+
+    /// The pixels in whose columns and rows any face may cover some, of the first `count` points.
+    #[inline(always)]
+    pub fn pixels_of_points(&self, count: usize) -> Pixels {
+        let range = |points: &[f64]| {
+            let (mut least, mut greatest) = (i32::MAX, i32::MIN);
+            for &place in &points[..count] {
+                let ceiling = round::ceil(place);
+                (least, greatest) = (least.min(ceiling), greatest.max(ceiling));
+            }
+            least..greatest
+        };
+        Pixels { columns: range(&self.points[0]), rows: range(&self.points[1]) }
+    }
+
+    /// Whether a line of pixels runs so near, in pixels, to one of the first `count` points.
+    #[inline(always)]
+    pub fn is_near_a_line(&self, count: usize, near: f64) -> bool {
+        let mut is_near = false;
+        for places in &self.points[..2] {
+            for &place in &places[..count] {
+                is_near |= round::nearest(place).1.abs() <= near;
+            }
+        }
+        is_near
+    }
+}
+
+/// Finds the places of points.
+#[inline(always)]
+fn project<const CONE: bool>(projection: &Projection, points: [&[f64]; 3], places: [&mut [f64]; 3]) {
+    let ([px, py, pz], [x, y, depth]) = (points, places);
+    for i in 0..px.len().min(py.len()).min(pz.len()).min(x.len()).min(y.len()).min(depth.len()) {
+        let point = projection.homogeneous(glam::DVec3::new(px[i], py[i], pz[i]));
+        let place = projection.place_in::<CONE>(point);
+        (x[i], y[i], depth[i]) = (place.x, place.y, place.depth);
+    }
+}

@@ -1,0 +1,182 @@
+//! The paper's second application: random volumes that are looked through without refraction (§3, Fig. 12).
+//!
+//! For every ray the lengths in all bodies, traced or by one RI-tree per body, and the grey that a pixel shows of them.
+//! Generic over the number, so that both ways' operations can be counted.
+
+use rayon::prelude::*;
+
+use crate::attributes::smooth_chord::{SmoothChords, chord};
+use crate::error::Result;
+use crate::geometry::{Bounds, Ray, Real, Region};
+use crate::modes::Control;
+use crate::modes::project::tiles;
+use crate::modes::raytrace::Tracing;
+use crate::ritree::{Answer, BuildCounts, Cache, RiTree};
+use crate::scene::trace::{Camera, World};
+use crate::surface::{Slabs, Surface};
+
+/// What is left of the light on the way through half a body's longest side: its opacity is one half (§3.7).
+const LET_THROUGH: f64 = 0.5;
+
+/// A world made ready to be looked through. Its bodies must be closed and convex.
+pub struct Bodies<'a, R: Real> {
+    bodies: Vec<Body<'a, R>>,
+    cache: Cache,
+}
+
+struct Body<'a, R: Real> {
+    surface: &'a Surface,
+    bounds: Bounds,
+    /// Half its longest side.
+    unit: f64,
+    tree: Option<RiTree<SmoothChords<'a, R>>>,
+}
+
+/// What is seen of one view.
+#[derive(Clone, Debug, Default)]
+pub struct Lengths {
+    /// For every pixel, row by row, the length in each body, in half its longest side: the unit of the distance threshold.
+    pub lengths: Vec<f32>,
+    /// The grey of each pixel, 1 where nothing is in the way.
+    pub greys: Vec<f32>,
+    /// Floating-point operations; 0 unless they were counted.
+    pub operations: u64,
+}
+
+impl Lengths {
+    /// The mean difference of lengths over all rays that meet the body in either. 0 if none does.
+    pub fn mean_difference(&self, other: &Self) -> f64 {
+        let pairs = || self.lengths.iter().zip(&other.lengths).filter(|(a, b)| **a > 0.0 || **b > 0.0);
+        let sum: f64 = pairs().map(|(a, b)| f64::from((a - b).abs())).sum();
+        sum / (pairs().count().max(1)) as f64
+    }
+}
+
+impl<'a, R: Real> Bodies<'a, R> {
+    /// Makes a world ready. Trees that outgrow the cache are not pruned: what does not fit is computed and forgotten.
+    pub fn new(world: &'a World, tracing: Tracing) -> Self {
+        let (parameters, cache_bytes) = match tracing {
+            Tracing::Exact => (None, 0),
+            Tracing::RiTree(trees) => (Some(trees.parameters), trees.cache_bytes),
+        };
+        let body = |surface: &'a Surface| {
+            let bounds = surface.bounds();
+            let tree =
+                parameters.and_then(|p| SmoothChords::new(surface).map(|chords| RiTree::new(chords, p)));
+            Body { surface, bounds, unit: 0.5 * bounds.size().max_element(), tree }
+        };
+        let bodies = world.objects.iter().map(|object| body(&object.surface)).collect();
+        Self { bodies, cache: Cache::new(cache_bytes) }
+    }
+
+    /// Looks through all bodies along the rays of one view.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`](crate::Error::Interrupted) within a tile's time of a request to stop.
+    pub fn lengths(&self, camera: &Camera, size: (u32, u32), control: &Control) -> Result<Lengths> {
+        let tiles: Vec<(Region, Lengths)> = tiles(size)
+            .into_par_iter()
+            .map(|region| {
+                control.check()?;
+                let (tile, operations) = R::count(|| self.tile(camera, size, &region));
+                Ok((region, Lengths { operations, ..tile }))
+            })
+            .collect::<Result<_>>()?;
+        let (pixels, bodies) = (size.0 as usize * size.1 as usize, self.bodies.len());
+        let mut all =
+            Lengths { lengths: vec![0.0; bodies * pixels], greys: vec![1.0; pixels], operations: 0 };
+        for (region, tile) in tiles {
+            for (i, (column, row)) in region.places().enumerate() {
+                let at = row as usize * size.0 as usize + column as usize;
+                all.greys[at] = tile.greys[i];
+                all.lengths[bodies * at..][..bodies].copy_from_slice(&tile.lengths[bodies * i..][..bodies]);
+            }
+            all.operations += tile.operations;
+        }
+        Ok(all)
+    }
+
+    fn tile(&self, camera: &Camera, size: (u32, u32), region: &Region) -> Lengths {
+        let mut tile = Lengths::default();
+        for (column, row) in region.places() {
+            let ray = camera.ray::<R>(size, f64::from(column) + 0.5, f64::from(row) + 0.5);
+            let mut light = R::of(1.0);
+            for body in &self.bodies {
+                let length = body.length(&ray, &self.cache) * R::of(1.0 / body.unit);
+                if length.get() > 0.0 {
+                    // The ray may be at its second body: greys multiply, in whatever order.
+                    light = light * R::of(LET_THROUGH).powf(length.get());
+                }
+                tile.lengths.push(length.get() as f32);
+            }
+            tile.greys.push(light.get() as f32);
+        }
+        tile
+    }
+
+    /// Bytes that the trees hold.
+    pub fn tree_bytes(&self) -> usize {
+        self.cache.used_bytes()
+    }
+
+    /// What building the trees took.
+    pub fn build_counts(&self) -> BuildCounts {
+        let mut sum = BuildCounts::default();
+        self.bodies.iter().filter_map(|body| body.tree.as_ref()).for_each(|tree| sum += tree.build_counts());
+        sum
+    }
+}
+
+impl<R: Real> Body<'_, R> {
+    /// The length of a ray of unit direction from outside in the body, mm.
+    fn length(&self, ray: &Ray<R>, cache: &Cache) -> R {
+        let is_met = Slabs::new(ray).stretch(&self.bounds).is_some_and(|(_, far)| far.get() > 0.0);
+        if !is_met {
+            return R::of(0.0);
+        }
+        let known = self.tree.as_ref().map(|tree| tree.query(tree.attribute().lines().point_of(ray), cache));
+        match known {
+            Some(None) => R::of(0.0),
+            Some(Some(Answer::Interpolated(known))) => R::of(known.map_or(0.0, |c| c.length.into())),
+            Some(Some(Answer::Trace(_))) | None => {
+                chord(self.surface, ray).map_or(R::of(0.0), |(length, _)| length)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Counted;
+    use crate::modes::raytrace::Trees;
+    use crate::ritree::Parameters;
+    use crate::scene::trace::{Recipe, random_volumes};
+
+    const SIZE: (u32, u32) = (30, 20);
+
+    fn seen<R: Real>(world: &World, tracing: Tracing) -> Lengths {
+        Bodies::<R>::new(world, tracing).lengths(&world.cameras[0], SIZE, &Control::none()).expect("done")
+    }
+
+    #[test]
+    fn lengths_by_trees_are_near_and_counting_changes_none() {
+        let world = random_volumes(Recipe { seed: 3, count: 4 }).expect("a world");
+        let trees = |distance_threshold| {
+            // Whatever the angle: cells that are traced have no error.
+            let angular_threshold_deg = 180.0;
+            let parameters = Parameters { distance_threshold, angular_threshold_deg, max_depth: 22 };
+            Tracing::RiTree(Trees { parameters, ..Trees::default() })
+        };
+        let exact = seen::<f64>(&world, Tracing::Exact);
+        assert!(exact.greys.iter().any(|g| *g < 0.7) && exact.greys.contains(&1.0));
+        let errors =
+            [0.01, 0.25].map(|threshold| exact.mean_difference(&seen::<f64>(&world, trees(threshold))));
+        assert!(0.0 < errors[0] && errors[0] < errors[1] && errors[1] < 0.2, "{errors:?}");
+        for tracing in [Tracing::Exact, trees(0.25)] {
+            let (plain, counted) = (seen::<f64>(&world, tracing), seen::<Counted>(&world, tracing));
+            assert!(plain.lengths == counted.lengths && plain.greys == counted.greys);
+            assert!(counted.operations > 10_000 && plain.operations == 0);
+        }
+    }
+}
