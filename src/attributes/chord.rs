@@ -3,10 +3,10 @@
 use crate::exact::Body;
 use crate::geometry::{Interval, Line};
 use crate::linespace::{Cell, LinePoint, LineSpace, PlanePair};
-use crate::ritree::Attribute;
+use crate::ritree::{Attribute, Keepable};
 
 /// A chord, as samples hold it. f32: its rounding, 6e-8 of the value, is far below any useful threshold.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Chord {
     /// Its length, mm.
     pub length_mm: f32,
@@ -108,6 +108,15 @@ impl Attribute for ChordLength<'_> {
         cell.shaft_planes(pair).any(|(normal, least)| {
             !self.body.surface().reaches_above(normal / size, min, least - LEAST_SEPARATION)
         })
+    }
+}
+
+impl Keepable for ChordLength<'_> {
+    fn is_sound(&self, output: &Self::Output) -> bool {
+        // Sixteen of the largest would still be added up.
+        let is_small = |x: f32| x.abs() < 1e30;
+        output
+            .is_none_or(|chord| chord.length_mm >= 0.0 && is_small(chord.length_mm) && is_small(chord.entry))
     }
 }
 

@@ -12,7 +12,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use crate::output::png::Polarity;
 use crate::physics::DetectorResponse;
 pub use audit::{AuditArgs, RayArgs};
-pub use bench::{BenchCommand, CurveArgs, PaperArgs, RunArgs, ScaleArgs};
+pub use bench::{BenchCommand, ChoiceArgs, CurveArgs, PaperArgs, RunArgs, ScaleArgs};
 pub use dose::{DoseArgs, FormatArg, TableArg};
 pub use trace::TraceArgs;
 
@@ -105,6 +105,10 @@ pub struct ProjectArgs {
     #[command(flatten)]
     pub method: MethodArgs,
 
+    /// Trees of other runs.
+    #[command(flatten)]
+    pub keep: KeepArgs,
+
     /// RI-tree: also write the map of traced pixels: white where any organ with a tree was traced, grey where all were
     /// interpolated.
     #[arg(long)]
@@ -160,9 +164,22 @@ pub struct TreeArgs {
     /// RI-tree: the share of the cache that is kept when it is pruned.
     #[arg(long, value_name = "SHARE", default_value_t = 0.3, allow_negative_numbers = true)]
     pub prune_keep: f64,
-    /// RI-tree: bodies with fewer face planes are found exactly instead [default: 48; 200000 of `auto`]
+    /// RI-tree: bodies with fewer face planes are found exactly instead [default: 48]; tells `auto` to put all others in trees
     #[arg(long, value_name = "N")]
     pub tree_planes: Option<usize>,
+}
+
+/// Trees that are kept from run to run.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Method")]
+pub struct KeepArgs {
+    /// RI-tree: start with the trees of this file, as many as `--cache-mb` has room for: lengths are the same bits, found sooner. A
+    /// file of other bodies, settings or versions is refused.
+    #[arg(long, value_name = "FILE")]
+    pub load_trees: Option<PathBuf>,
+    /// RI-tree: write all trees to this file at the end, for `--load-trees`. Either asks for trees in place of `auto`.
+    #[arg(long, value_name = "FILE")]
+    pub save_trees: Option<PathBuf>,
 }
 
 /// What is interpolated, as an argument.
@@ -177,7 +194,7 @@ pub enum InterpolationArg {
 /// A method as an argument.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum MethodArg {
-    /// By RI-trees for organs on which they were measured to be quicker, exactly for all others.
+    /// By RI-trees for organs for which they are estimated to be quicker in this study, exactly for all others.
     Auto,
     /// By RI-trees.
     Ritree,

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::args::{AuditArgs, RayArgs};
 use super::project::{change, method, method_named, open};
-use super::{Outcome, Session, command_line, print, shell_words};
+use super::{Outcome, Session, command_line, keep, print, shell_words};
 use crate::error::{Error, Result};
 use crate::modes::Control;
 use crate::modes::audit::{Audit, AuditReport, AuditSettings, Probe, RaySet, shell_word};
@@ -18,7 +18,7 @@ use crate::modes::project::Method;
 use crate::modes::stability::{self, Effort};
 use crate::output::page::short;
 use crate::output::{audit as output, json};
-use crate::scene::{Organ, Scene};
+use crate::scene::{Organ, Scene, View};
 
 /// Audits a scene: writes the report if a folder is named, says its sum on `out`, and tells whether a limit is broken.
 pub fn run(args: &AuditArgs, session: &Session, out: &mut dyn Write) -> Result<Outcome> {
@@ -33,16 +33,19 @@ pub fn run(args: &AuditArgs, session: &Session, out: &mut dyn Write) -> Result<O
             out,
         );
     }
+    let rays = rays(&args.rays, &scene)?;
+    let views: &[View] = if let RaySet::Views(views) = &rays { views } else { &[] };
     let settings = AuditSettings {
-        rays: rays(&args.rays, &scene)?,
-        method: method(&args.method)?,
+        method: keep::method(&args.keep, method(&args.method)?)?.for_views(views),
         against: args.against.map(|name| method_named(name, &args.method)).transpose()?,
         tolerance_mm: args.tolerance_mm,
+        rays,
     };
     if args.oracles {
         return ask_oracles(&scene, settings.method, args, session, out);
     }
-    let audit = Audit::new(&scene, settings)?;
+    let mut audit = Audit::new(&scene, settings)?;
+    keep::load(&args.keep, &mut audit, session)?;
     if let Some(probe) = probe(&args.rays) {
         return reproduce(&audit, &scene, probe, args, out).map(|()| Outcome::Done);
     }
@@ -55,6 +58,7 @@ pub fn run(args: &AuditArgs, session: &Session, out: &mut dyn Write) -> Result<O
     let control = Control::new(session.cancel(), &advance);
     let words: Vec<String> = std::env::args().skip(1).collect();
     let mut report = audit.run(&control)?;
+    keep::save(&args.keep, &audit, session)?;
     report.command = command_line();
     for worst in &mut report.worst {
         worst.reproduce = format!("chordfield {} {}", shell_words(&setting_words(&words)), worst.reproduce);

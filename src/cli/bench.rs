@@ -5,12 +5,13 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::args::{BenchCommand, CurveArgs, PaperArgs, RunArgs, ScaleArgs, SourceArgs};
+use super::args::{BenchCommand, ChoiceArgs, CurveArgs, PaperArgs, RunArgs, ScaleArgs, SourceArgs};
 use super::project::{change, open};
 use super::{Session, command_line, print};
 use crate::error::{Error, Result};
 use crate::modes::Control;
 use crate::modes::bench::Patience;
+use crate::modes::bench::choice::{self, ChoiceSettings};
 use crate::modes::bench::curve::{self, CurveSettings};
 use crate::modes::bench::paper::{self, PaperSettings};
 use crate::modes::bench::scale::{self, ScaleSettings};
@@ -37,6 +38,7 @@ pub fn run(command: &BenchCommand, session: &Session, out: &mut dyn Write) -> Re
     match command {
         BenchCommand::Curve(args) => run_curve(args, session, out),
         BenchCommand::Scale(args) => run_scale(args, session, out),
+        BenchCommand::Choice(args) => run_choice(args, session, out),
         BenchCommand::Paper(args) => run_paper(args, session, out),
     }
 }
@@ -80,6 +82,21 @@ fn run_scale(args: &ScaleArgs, session: &Session, out: &mut dyn Write) -> Result
     })?;
     report.command = command_line();
     finish(&args.run, &report, report.complete, output::write_scale, output::scale_table, out)
+}
+
+fn run_choice(args: &ChoiceArgs, session: &Session, out: &mut dyn Write) -> Result<()> {
+    let small = |&side: &u32| !args.run.quick || u64::from(side) * u64::from(side) <= SMALL;
+    let settings = ChoiceSettings {
+        subdivisions: args.subdivisions.clone(),
+        sizes: args.sizes.iter().copied().filter(small).collect(),
+        tolerances_mm: args.tolerances.clone(),
+        patience: patience(&args.run),
+    };
+    let mut report = measure(session, &args.run, choice::turns(&settings), "choice", |control| {
+        choice::choice(&settings, control)
+    })?;
+    report.command = command_line();
+    finish(&args.run, &report, report.complete, output::write_choice, output::choice_table, out)
 }
 
 fn run_paper(args: &PaperArgs, session: &Session, out: &mut dyn Write) -> Result<()> {

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::args::{DoseArgs, FormatArg, TableArg};
 use super::project::method;
-use super::{Session, command_line, print};
+use super::{Session, command_line, keep, print};
 use crate::error::{Error, Result};
 use crate::modes::Control;
 use crate::modes::dose::{self, CaseFigures, Dose, DoseReport, Keeper, NOTICE, NoPaths, Shard, StudyWords};
@@ -26,9 +26,10 @@ const TOLD_ORGANS: usize = 8;
 
 /// Follows a study's paths, or one part of them, or joins the parts. What will be done is said on `out` before it is begun.
 pub fn run(args: &DoseArgs, session: &Session, out: &mut dyn Write) -> Result<()> {
-    let method = method(&(&args.method).into())?;
+    let method = keep::method(&args.keep, method(&(&args.method).into())?)?;
     let study = Study::load(&args.study, &args.settings, args.zip)?;
-    let dose = Dose::new(&study, method)?;
+    let mut dose = Dose::new(&study, method)?;
+    keep::load(&args.keep, &mut dose, session)?;
     if args.dry_run || !args.json {
         let plan = Plan::of(&dose, args.shard.unwrap_or(Shard::WHOLE));
         print(out, &if args.json { json::text(&plan)? } else { plan.text() })?;
@@ -47,6 +48,7 @@ pub fn run(args: &DoseArgs, session: &Session, out: &mut dyn Write) -> Result<()
             let report = follow(&dose, Shard::WHOLE, &args.output, args, session, |keeper, control| {
                 keeper.run(&dose, control)
             })?;
+            keep::save(&args.keep, &dose, session)?;
             finish(&dose, report, args, session, out)
         }
     }
@@ -130,6 +132,7 @@ fn run_part(
     let part =
         follow(dose, shard, &folder, args, session, |keeper, control| keeper.run_part(dose, shard, control))?;
     output::write_part(&folder, &part)?;
+    keep::save(&args.keep, dose, session)?;
     if args.json {
         return print(out, &json::text(&Plan::of(dose, shard))?);
     }

@@ -5,6 +5,7 @@ mod audit;
 mod bench;
 mod check;
 mod dose;
+mod keep;
 mod phantom;
 mod project;
 mod session;

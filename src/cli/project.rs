@@ -9,22 +9,23 @@ use super::args::{
     BeamArgs, BeamKindArg, InterpolationArg, MethodArg, MethodArgs, Product, ProjectArgs, SourceArgs,
     TreeArgs,
 };
-use super::{Session, print};
+use super::{Session, keep, print};
 use crate::error::{Error, Result};
 use crate::exact::Engine;
 use crate::modes::Control;
 use crate::modes::project::{
-    DEFAULT_TOLERANCE_MM, Interpolation, LEAST_PLANES_WHERE_QUICKER, LEAST_RAYS_WHERE_QUICKER, Method,
-    Projector, QueryCounts, RayCounts, TreeSettings, Wanted,
+    DEFAULT_TOLERANCE_MM, Demand, Interpolation, Method, Projector, QueryCounts, RayCounts, TreeSettings,
+    Wanted,
 };
+use crate::output::page::short;
 use crate::output::projection::{self, Products};
-use crate::output::sidecar::{Sidecar, Summary, TreeSummary, ViewRecord};
+use crate::output::sidecar::{ChoiceRecord, Sidecar, Summary, TreeSummary, ViewRecord};
 use crate::output::{create_folder, json, remove_stale};
 use crate::physics::{PhotonNoise, Spectrum};
 use crate::ritree::Parameters;
 use crate::scene::beam::{BeamKind, BeamSpec, DetectorSpec};
 use crate::scene::ranges::Angles;
-use crate::scene::{Given, Scene, View, phantoms};
+use crate::scene::{Given, Organ, Scene, View, phantoms};
 
 /// Rays whose interpolated lengths are held against exact ones in each run.
 const SPOT_CHECK_RAYS: usize = 20_000;
@@ -41,8 +42,9 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
     let labels = labels(&scene.name, &views);
     let noise = args.photons.photons.map(|n| PhotonNoise::new(n, args.photons.seed)).transpose()?;
     let products = products(args);
-    let method = method(&args.method)?.for_rays(views.iter().map(View::pixels).sum());
-    let projector = Projector::new(&scene, wanted(&products), noise, method)?;
+    let method = keep::method(&args.keep, method(&args.method)?)?.for_views(&views);
+    let mut projector = Projector::new(&scene, wanted(&products), noise, method)?;
+    keep::load(&args.keep, &mut projector, session)?;
     session.begin_writing();
     create_folder(&args.output)?;
     let record = args.output.join(format!("{}.json", projection::safe_name(&scene.name)));
@@ -69,13 +71,18 @@ pub fn run(args: &ProjectArgs, session: &Session, out: &mut dyn Write) -> Result
         records.push((view, label.clone(), files));
     }
     bar.finish_and_clear();
+    // Before the check below asks for leaves of its own.
+    keep::save(&args.keep, &projector, session)?;
+    stages.end("write");
     let ritree = tree_summary(&projector, method, queries, &views);
     stages.end("check");
 
+    let choices = choices(&scene, &projector);
     let files = records.iter().flat_map(|(_, _, files)| files);
     let summary = Summary {
         method: method.name(),
-        choice: choice(method, &engines, ritree.as_ref()),
+        choice: choice(method, &choices, &engines),
+        choices,
         ritree,
         engines,
         views: views.len(),
@@ -200,22 +207,45 @@ fn tree_summary(
     })
 }
 
-/// What `auto` chose, and why.
-fn choice(method: Method, engines: &BTreeMap<Engine, u64>, trees: Option<&TreeSummary>) -> Option<String> {
+/// What `auto` chose for each organ that is needed, and why.
+fn choices(scene: &Scene, projector: &Projector) -> Vec<ChoiceRecord> {
+    let record = |(i, organ): (usize, &Organ)| {
+        let (estimate, is_in_tree) = projector.estimate(i)?;
+        let chosen = if is_in_tree { "ritree" } else { estimate.engine.name() };
+        Some(ChoiceRecord { organ: organ.name.clone(), chosen, estimate })
+    };
+    scene.organs.iter().enumerate().filter_map(record).collect()
+}
+
+/// The same in words.
+fn choice(method: Method, choices: &[ChoiceRecord], engines: &BTreeMap<Engine, u64>) -> Option<String> {
     let Method::Auto(settings) = method else { return None };
     let of_engines: Vec<String> =
         engines.iter().map(|(engine, n)| format!("{} {n}", engine.name())).collect();
-    Some(format!(
-        "{} organs in RI-trees: convex ones of {LEAST_PLANES_WHERE_QUICKER} face planes or more in studies of \
-         {LEAST_RAYS_WHERE_QUICKER} rays or more, on which trees were measured to be quicker{}; others exactly, by the engine of \
-         least estimated cost for their faces and pixels, organs counted per view: {}",
-        trees.map_or(0, |trees| trees.trees.trees),
-        match settings.least_planes {
-            LEAST_PLANES_WHERE_QUICKER | usize::MAX => String::new(),
-            planes => format!("; here, as asked for, ones of {planes} or more"),
-        },
+    let exact = format!(
+        "others exactly, by the engine of least estimated cost for their faces and pixels, organs counted per view: {}",
         if of_engines.is_empty() { "none".into() } else { of_engines.join(", ") }
-    ))
+    );
+    let Some(demand) = settings.demand else {
+        let planes = settings.least_planes;
+        return Some(format!(
+            "RI-trees for convex organs of {planes} face planes or more, as asked for; {exact}"
+        ));
+    };
+    let in_trees: Vec<String> = choices
+        .iter()
+        .filter(|record| record.chosen == "ritree")
+        .map(|ChoiceRecord { organ, estimate, .. }| {
+            let (tree_s, exact_s) = (short(estimate.tree_s), short(estimate.exact_s));
+            format!("{organ} ({tree_s} s in place of {exact_s} s by {})", estimate.engine.name())
+        })
+        .collect();
+    let of_trees = match in_trees.len() {
+        0 => "no organ in an RI-tree, as growing it and asking it are estimated to take longer than tracing"
+            .into(),
+        _ => format!("in RI-trees, by estimates: {}", in_trees.join(", ")),
+    };
+    Some(format!("for {} views of {} pixels in all: {of_trees}; {exact}", demand.views, demand.pixels))
 }
 
 /// The method that the arguments name.
@@ -303,12 +333,13 @@ pub fn method_named(name: MethodArg, args: &MethodArgs) -> Result<Method> {
     let args = &args.trees;
     let (cache_bytes, kept_share) = cache(args)?;
     let interpolation = interpolation(args)?;
-    let trees = |least_planes| TreeSettings {
+    let trees = |demand| TreeSettings {
         interpolation,
         cache_bytes,
         kept_share,
-        least_planes: args.tree_planes.unwrap_or(least_planes),
+        least_planes: args.tree_planes.unwrap_or(TreeSettings::default().least_planes),
         general_bodies: name == MethodArg::Ritree,
+        demand,
     };
     Ok(match name {
         MethodArg::Exact => Method::Exact(None),
@@ -317,10 +348,13 @@ pub fn method_named(name: MethodArg, args: &MethodArgs) -> Result<Method> {
         MethodArg::Raster => Method::Exact(Some(Engine::Raster)),
         MethodArg::Bvh => Method::Exact(Some(Engine::Bvh)),
         // The paper's trees are never the quicker: who names one of its thresholds wants to see them.
-        MethodArg::Ritree => Method::RiTree(trees(TreeSettings::default().least_planes)),
+        MethodArg::Ritree => Method::RiTree(trees(None)),
         MethodArg::Auto => match interpolation {
-            Interpolation::Quadrilinear { .. } => Method::RiTree(trees(TreeSettings::default().least_planes)),
-            Interpolation::SquaredChord { .. } => Method::Auto(trees(LEAST_PLANES_WHERE_QUICKER)),
+            Interpolation::Quadrilinear { .. } => Method::RiTree(trees(None)),
+            // Who says from how many planes on has chosen.
+            Interpolation::SquaredChord { .. } => {
+                Method::Auto(trees(args.tree_planes.is_none().then(Demand::default)))
+            }
         },
     })
 }

@@ -48,6 +48,19 @@ mod cost {
     }
 }
 
+/// What an image of a body is estimated to cost, nanoseconds of one thread. Only ratios matter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImageCost {
+    /// The quickest engine.
+    pub engine: Engine,
+    /// All of the image by that engine.
+    pub ns: f64,
+    /// Pixels of the rectangle that the body is seen in.
+    pub pixels: f64,
+    /// One of them by a walk.
+    pub walked_pixel_ns: f64,
+}
+
 impl Engine {
     /// Its name.
     pub fn name(self) -> &'static str {
@@ -71,13 +84,21 @@ impl Engine {
 impl Body {
     /// The quickest engine for an image: the raster, unless the body is seen in few pixels for the number of its faces.
     pub fn engine_for_image(&self, grid: &RayGrid) -> Engine {
+        self.image_cost(grid).engine
+    }
+
+    /// What an image is estimated to cost by that engine.
+    pub fn image_cost(&self, grid: &RayGrid) -> ImageCost {
         let pixels = raster::pixels_around(&self.bounds(), grid) as f64;
         let faces = self.surface().mesh().faces.len() as f64;
+        let walk = cost::walk(faces, pixels);
         let (other, cost) = match self.convexity() {
-            Ok(_) => (Engine::Walk, cost::walk(faces, pixels)),
+            Ok(_) => (Engine::Walk, walk),
             Err(_) => (Engine::Bvh, cost::bvh(faces, pixels)),
         };
-        if cost < cost::raster(faces, pixels) { other } else { Engine::Raster }
+        let raster = cost::raster(faces, pixels);
+        let (engine, ns) = if cost < raster { (other, cost) } else { (Engine::Raster, raster) };
+        ImageCost { engine, ns, pixels, walked_pixel_ns: walk / pixels.max(1.0) }
     }
 
     /// The quickest engine for rays in no order.

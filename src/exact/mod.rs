@@ -29,7 +29,7 @@ mod shear;
 pub mod walk;
 
 pub use body::Body;
-pub use engine::{BodyView, Engine};
+pub use engine::{BodyView, Engine, ImageCost};
 pub use record::{Lengths, Passes, Pierce, Pierced, Record, Spans, Way};
 
 #[cfg(test)]

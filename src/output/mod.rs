@@ -26,6 +26,7 @@ pub mod picture;
 pub mod png;
 pub mod projection;
 pub mod sidecar;
+pub mod trees;
 
 pub use atomic::{AtomicFile, create_folder, remove_stale, write_atomically};
 pub use image::{FloatImage, Geometry, RgbImage, RgbaImage, image_of};

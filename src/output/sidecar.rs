@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::projection::WrittenFile;
 use crate::exact::Engine;
 use crate::modes::figures::Figures;
-use crate::modes::project::{ForestReport, QueryCounts, RayCounts, TreeSettings};
+use crate::modes::project::{Estimate, ForestReport, QueryCounts, RayCounts, TreeSettings};
 use crate::physics::{PhotonNoise, Spectrum};
 use crate::scene::organ::{Organ, Origin};
 use crate::scene::{Pose, Scene, View};
@@ -200,6 +200,9 @@ pub struct Summary {
     /// What was chosen and why, if the method is to choose.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub choice: Option<String>,
+    /// For each organ, if the method is to choose.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub choices: Vec<ChoiceRecord>,
     /// Views projected.
     pub views: usize,
     /// Organs in the scene.
@@ -222,6 +225,18 @@ pub struct Summary {
     pub files: usize,
     /// Bytes written.
     pub bytes_written: u64,
+}
+
+/// What was chosen for one organ.
+#[derive(Clone, Debug, Serialize)]
+pub struct ChoiceRecord {
+    /// Its name.
+    pub organ: String,
+    /// `ritree`, or the exact engine of least estimated cost.
+    pub chosen: &'static str,
+    /// What decided.
+    #[serde(flatten)]
+    pub estimate: Estimate,
 }
 
 /// What RI-trees did in a run.

@@ -26,8 +26,9 @@ pub enum Verdict {
     Final(Kind),
 }
 
-/// How a final cell answers its lines.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// How a final cell answers its lines. The order of these, and of the reasons, is part of the format of
+/// [kept](super::kept) trees.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Kind {
     /// No line meets the object, proved.
     Empty,
@@ -40,7 +41,7 @@ pub enum Kind {
 }
 
 /// Why a line is traced instead of interpolated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Reason {
     /// Its cell lies across the object's outline, or another single discontinuity.
     Silhouette,
@@ -133,6 +134,11 @@ impl Place {
         ]
     }
 
+    /// Whether the cell is final whatever its samples say.
+    pub fn is_deepest(&self, parameters: &Parameters) -> bool {
+        self.depth >= parameters.max_depth.min(DEEPEST)
+    }
+
     /// What is to be done with the cell (§2.3, and §2.5 for its kind).
     pub fn verdict<A: Attribute>(
         &self,
@@ -140,7 +146,7 @@ impl Place {
         corners: &Corners<A::Output>,
         parameters: &Parameters,
     ) -> Verdict {
-        let is_deepest = self.depth >= parameters.max_depth.min(DEEPEST);
+        let is_deepest = self.is_deepest(parameters);
         let class = attribute.class(&corners[0]);
         let other = corners.iter().map(|c| attribute.class(c)).find(|&c| c != class);
         if let Some(other) = other {

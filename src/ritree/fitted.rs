@@ -9,6 +9,7 @@
 //! The law is the tree's of the paper: what becomes of a cell is a function of the cell, so that no answer depends on the order
 //! of queries, on threads, or on what the cache still holds.
 
+mod kept;
 mod upkeep;
 
 use std::mem::size_of;
@@ -20,6 +21,7 @@ use super::cell::Place;
 use super::stats::{BuildCounters, TreeShape};
 use crate::linespace::PlanePair;
 use crate::linespace::image::{PlaneForms, Runs};
+pub use kept::KeepableFit;
 
 /// Fits cells. Every method must be a pure function of its arguments.
 pub trait Fit: Sync {

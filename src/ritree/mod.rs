@@ -21,6 +21,7 @@ mod cache;
 mod cell;
 mod descent;
 mod fitted;
+pub mod kept;
 mod node;
 mod stats;
 #[cfg(test)]
@@ -33,7 +34,8 @@ pub use attribute::Attribute;
 pub use cache::{Cache, oldest_to_keep};
 pub use cell::{Place, Reason};
 pub use descent::Descent;
-pub use fitted::{Fit, Fitted, FittedTree};
+pub use fitted::{Fit, Fitted, FittedTree, KeepableFit};
+pub use kept::{Keepable, Loaded, Unreadable};
 pub use stats::{BuildCounts, TreeShape};
 
 use crate::geometry::Real;
@@ -43,7 +45,7 @@ use node::Node;
 use stats::BuildCounters;
 
 /// The tree's settings; the defaults are the paper's.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Parameters {
     /// A cell splits if its middle is interpolated worse than this, in the attribute's own distance.
     pub distance_threshold: f64,

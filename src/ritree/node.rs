@@ -66,6 +66,16 @@ impl<T: Clone + Send + Sync> Node<T> {
         self.halves.get().map(|halves| &**halves)
     }
 
+    /// Splits a node that is known to be, without a look. The cache is to have room for the halves.
+    pub fn split_unseen(&self) -> &[Self; 2] {
+        self.halves.get_or_init(Box::default)
+    }
+
+    /// Makes a node final by a leaf that is known. The cache is to have room for it.
+    pub fn finish(&self, leaf: Leaf<T>) {
+        let _ = self.leaf.set(Box::new(leaf));
+    }
+
     fn lock(&self) -> MutexGuard<'_, Option<Box<Corners<T>>>> {
         // A panic while expanding leaves the corners taken: they are sampled again.
         self.corners.lock().unwrap_or_else(PoisonError::into_inner)

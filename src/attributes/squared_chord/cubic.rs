@@ -15,6 +15,23 @@ pub type Local = [f64; 4];
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cubic(pub [f64; TERMS]);
 
+/// As it is kept: serde knows no array as long as all of it.
+type Rows = [[f64; 7]; 5];
+
+impl serde::Serialize for Cubic {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let rows: Rows = std::array::from_fn(|row| std::array::from_fn(|i| self.0[7 * row + i]));
+        rows.serialize(serializer)
+    }
+}
+
+impl<'de> serde::Deserialize<'de> for Cubic {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let rows = Rows::deserialize(deserializer)?;
+        Ok(Self(std::array::from_fn(|term| rows[term / 7][term % 7])))
+    }
+}
+
 impl Cubic {
     /// Its value.
     #[inline(always)]

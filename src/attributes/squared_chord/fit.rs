@@ -6,7 +6,7 @@ use super::samples::{Hit, Samples};
 use super::shaft::{Shaft, Sheets};
 use super::{ChordLeaf, ChordModel, SquaredChord};
 use crate::linespace::{LineFrame, squared_span};
-use crate::ritree::{Fit, Fitted, Place, TreeShape};
+use crate::ritree::{Fit, Fitted, KeepableFit, Place, TreeShape};
 
 /// The largest cells are of a level between these: 3/8 to 3/32 of the body's box wide. In larger ones, few lines hit in too
 /// many cells.
@@ -273,7 +273,7 @@ impl Fit for SquaredChord<'_> {
             (Some(fit), _) if !fit.threshold.is_finite() => Some(ChordLeaf::Traced),
             (Some(fit), _) => Some(ChordLeaf::Model(ChordModel {
                 centre: place.cell.centre(),
-                scale: 2.0 / (place.cell.high[0] - place.cell.low[0]),
+                scale: scale_of(place),
                 cubic: fit.cubic,
                 threshold: fit.threshold,
                 middle: fit.middle,
@@ -319,6 +319,31 @@ struct Missed {
     samples: u64,
     /// Whether all lines do, proved.
     is_empty: bool,
+}
+
+impl KeepableFit for SquaredChord<'_> {
+    fn is_sound(&self, leaf: &ChordLeaf, place: &Place) -> bool {
+        let model = match leaf {
+            ChordLeaf::Empty | ChordLeaf::Traced => return true,
+            ChordLeaf::Planes(few) => return self.are_planes(few),
+            ChordLeaf::Model(model) => model,
+        };
+        // Of places within the cell, powers and sums of such coefficients stay finite.
+        let is_small = |x: &f64| x.abs() < 1e100;
+        let ChordModel { centre, scale, cubic, threshold, middle } = model;
+        *centre == place.cell.centre()
+            && *scale == scale_of(place)
+            && cubic.0.iter().all(is_small)
+            && *threshold >= 0.0
+            && is_small(threshold)
+            && middle.is_some() == self.wants_places
+            && middle.iter().flat_map(|middle| &middle.0).all(is_small)
+    }
+}
+
+/// From intercepts about a cell's centre to its local coordinates.
+fn scale_of(place: &Place) -> f64 {
+    2.0 / (place.cell.high[0] - place.cell.low[0])
 }
 
 /// What samples of a cell say.

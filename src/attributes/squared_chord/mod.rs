@@ -67,8 +67,8 @@ pub struct SquaredChord<'a> {
     is_hopeless: bool,
 }
 
-/// What answers the lines of a final cell.
-#[derive(Clone, Debug, PartialEq)]
+/// What answers the lines of a final cell. The order of these is part of the format of [kept](crate::ritree::kept) trees.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[expect(clippy::large_enum_variant, reason = "nearly all leaves are models, and the tree boxes each")]
 pub enum ChordLeaf {
     /// No line meets the body, proved.
@@ -82,7 +82,7 @@ pub enum ChordLeaf {
 }
 
 /// F in one cell.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ChordModel {
     centre: [f64; 4],
     /// From intercepts about the centre to the cell's local coordinates.

@@ -49,6 +49,14 @@ impl SquaredChord<'_> {
         are_few.then_some(FewPlanes { planes, is_met })
     }
 
+    /// Whether these may be the planes of a leaf: some, not too many, in order, each of the body.
+    pub(super) fn are_planes(&self, few: &[u32]) -> bool {
+        let count = self.body.convexity().map_or(0, |convex| convex.planes().len());
+        (1..=MOST_PLANES).contains(&few.len())
+            && few.is_sorted_by(|a, b| a < b)
+            && few.iter().all(|&plane| (plane as usize) < count)
+    }
+
     fn planes_of<'s>(&'s self, few: &'s [u32]) -> impl Iterator<Item = &'s Plane> {
         let all = self.body.convexity().map_or(&[][..], |convex| convex.planes());
         few.iter().filter_map(|&plane| all.get(plane as usize))

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{BeamArgs, MethodArg, MethodArgs, SourceArgs, numbers};
+use super::{BeamArgs, KeepArgs, MethodArg, MethodArgs, SourceArgs, numbers};
 use crate::modes::audit::DEFAULT_TOLERANCE_MM;
 
 /// `audit`.
@@ -36,7 +36,7 @@ pub struct AuditArgs {
 
     /// In place of a comparison: hold the method to identities and integrals that need no second engine. Exit with 1 if one
     /// fails.
-    #[arg(long, conflicts_with_all = ["against", "output", "limit_mm"])]
+    #[arg(long, conflicts_with_all = ["against", "output", "limit_mm", "load_trees", "save_trees"])]
     pub oracles: bool,
 
     /// In place of a comparison: hold every exact engine to rationals, in each organ along so many rays of each kind that is
@@ -47,7 +47,9 @@ pub struct AuditArgs {
         value_parser = parse_count,
         num_args = 0..=1,
         default_missing_value = "500",
-        conflicts_with_all = ["against", "output", "limit_mm", "oracles", "rays", "adversarial", "ray", "pixel"]
+        conflicts_with_all = [
+            "against", "output", "limit_mm", "oracles", "rays", "adversarial", "ray", "pixel", "load_trees", "save_trees"
+        ]
     )]
     pub stress: Option<u64>,
 
@@ -58,6 +60,10 @@ pub struct AuditArgs {
     /// How lengths are found that are judged.
     #[command(flatten)]
     pub method: MethodArgs,
+
+    /// Trees of other runs.
+    #[command(flatten)]
+    pub keep: KeepArgs,
 
     /// Where the views' rays come from, in place of what the scene says.
     #[command(flatten)]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::{BeamArgs, parse_pixels};
+use super::{BeamArgs, parse_mm, parse_pixels};
 use crate::modes::bench::paper::{Input, input_named};
 use crate::modes::bench::scale::study_names;
 
@@ -15,9 +15,39 @@ pub enum BenchCommand {
     Curve(Box<CurveArgs>),
     /// How time grows with faces, pixels, views, organs, threads and the cache.
     Scale(ScaleArgs),
+    /// How far what `--method auto` chooses is from the best of all methods, over faces, pixels, views and tolerances.
+    Choice(ChoiceArgs),
     /// The tables and figures of Atalay & Mount on this machine, beside their own: what the paper's trees gain and lose as
     /// their settings change.
     Paper(PaperArgs),
+}
+
+/// `bench choice`.
+#[derive(Debug, Args)]
+pub struct ChoiceArgs {
+    /// The bodies: icosahedra whose faces are quartered so often; they have 20 · 4ⁿ faces.
+    #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = clap::value_parser!(u32).range(0..=7), default_value = "1,2,3,4,5,6,7")]
+    pub subdivisions: Vec<u32>,
+
+    /// Columns, and rows, of the views.
+    #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = clap::value_parser!(u32).range(1..=8192), default_value = "300,600,2048")]
+    pub sizes: Vec<u32>,
+
+    /// Tolerances of the trees, mm.
+    #[arg(long, value_delimiter = ',', value_name = "MM,…", value_parser = parse_tolerance, default_value = "0.02,0.5")]
+    pub tolerances: Vec<f64>,
+
+    /// What all benchmarks share.
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+fn parse_tolerance(text: &str) -> Result<f64, String> {
+    match parse_mm(text) {
+        Ok(mm) if (1e-9..=1e9).contains(&mm) => Ok(mm),
+        Ok(_) => Err("give millimetres, more than 0".into()),
+        Err(problem) => Err(problem),
+    }
 }
 
 /// `bench curve`.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::{MethodArg, MethodArgs, TreeArgs};
+use super::{KeepArgs, MethodArg, MethodArgs, TreeArgs};
 use crate::modes::dose::Shard;
 use crate::output::dose::{Format, Table};
 
@@ -64,6 +64,10 @@ pub struct DoseArgs {
     /// How lengths are found.
     #[command(flatten)]
     pub method: DoseMethodArgs,
+
+    /// Trees of other runs.
+    #[command(flatten)]
+    pub keep: KeepArgs,
 }
 
 /// How lengths are found: exactly, unless trees are asked for.

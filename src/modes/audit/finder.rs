@@ -5,13 +5,16 @@
 //!   (for the run)           (for one view, or for rays in no order)
 //! ```
 
+use std::io::{self, Write};
+
 use rayon::prelude::*;
 
 use crate::attributes::squared_chord::{ImageChords, ImageLengths, places_of};
 use crate::exact::{Body, BodyView, Engine, Lengths, Spans};
 use crate::geometry::{Region, Segment};
-use crate::modes::project::forest::{Forest, holds_box};
-use crate::modes::project::{Found, Method, TreeSettings};
+use crate::modes::project::forest::{Forest, holds_box, kept};
+use crate::modes::project::{Found, Method, Source, TreeSettings};
+use crate::ritree::{Loaded, Unreadable};
 use crate::scene::View;
 
 /// Rays to be asked for together.
@@ -44,6 +47,16 @@ pub(super) trait Finder: Sync {
     /// Whether what a pixel gets takes its image's other rays to be found again, to the last bit.
     fn needs_image(&self, _organ: usize) -> bool {
         false
+    }
+
+    /// See [`KeepsTrees`](crate::modes::project::KeepsTrees).
+    fn save_trees(&self, out: &mut dyn Write) -> io::Result<()> {
+        kept::save(&[], out)
+    }
+
+    /// See [`KeepsTrees`](crate::modes::project::KeepsTrees).
+    fn load_trees(&mut self, source: &mut dyn Source) -> Result<Loaded, Unreadable> {
+        kept::load(&mut [], source)
     }
 
     /// Whether an organ's rays may be interpolated.
@@ -99,6 +112,14 @@ impl Finder for ByMethod<'_> {
 
     fn needs_image(&self, organ: usize) -> bool {
         !self.grows(organ) || self.forest.as_ref().is_some_and(Forest::finds_runs)
+    }
+
+    fn save_trees(&self, out: &mut dyn Write) -> io::Result<()> {
+        kept::save(&self.forest.iter().collect::<Vec<_>>(), out)
+    }
+
+    fn load_trees(&mut self, source: &mut dyn Source) -> Result<Loaded, Unreadable> {
+        kept::load(&mut self.forest.iter_mut().collect::<Vec<_>>(), source)
     }
 
     fn is_in_tree(&self, organ: usize) -> bool {

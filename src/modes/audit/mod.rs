@@ -33,14 +33,17 @@ mod report;
 mod tests;
 mod worst;
 
+use std::io;
+
 use glam::DVec3;
 
 use super::Control;
-use super::project::Method;
+use super::project::{KeepsTrees, Method, Source};
 use crate::error::{Error, Result};
 use crate::exact::{Body, Engine};
 use crate::geometry::{Region, Segment};
 use crate::modes::project::Found;
+use crate::ritree::{Loaded, Unreadable};
 use crate::scene::{Scene, View};
 use compare::Comparison;
 use finder::{Batch, ByMethod, Finder, Reference};
@@ -296,6 +299,17 @@ impl<'a> Audit<'a> {
             }
             _ => None,
         }
+    }
+}
+
+/// The trees of the method that is judged.
+impl KeepsTrees for Audit<'_> {
+    fn save_trees(&self, out: &mut dyn io::Write) -> io::Result<()> {
+        self.method.save_trees(out)
+    }
+
+    fn load_trees(&mut self, source: &mut dyn Source) -> Result<Loaded, Unreadable> {
+        self.method.load_trees(source)
     }
 }
 

@@ -10,6 +10,7 @@
 //! *Warm* is the same views once more. Contenders take turns, so that whatever slows the machine slows them all; times are
 //! medians, and told to be unsteady where they are.
 
+pub mod choice;
 pub mod curve;
 mod machine;
 pub mod paper;

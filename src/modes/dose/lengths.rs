@@ -51,6 +51,16 @@ impl<'a> Tracer<'a> {
         Ok(Self { bodies, bounds, engine, forest })
     }
 
+    /// Its trees.
+    pub fn forest(&self) -> Option<&Forest<'a>> {
+        self.forest.as_ref()
+    }
+
+    /// Its trees, to be replaced by others.
+    pub fn forest_mut(&mut self) -> Option<&mut Forest<'a>> {
+        self.forest.as_mut()
+    }
+
     /// Finds the chords of all paths in all organs.
     pub fn trace(&self, paths: &[Segment], chords: &mut Chords) {
         chords.found.clear();

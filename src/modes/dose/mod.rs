@@ -34,6 +34,7 @@ mod picture;
 mod report;
 mod sums;
 
+use std::io;
 use std::ops::Range;
 
 use glam::DVec3;
@@ -43,9 +44,11 @@ use rayon::prelude::*;
 
 use super::Control;
 use super::audit::{Audit, AuditSettings, DEFAULT_TOLERANCE_MM, RaySet};
-use super::project::Method;
+use super::project::forest::kept;
+use super::project::{KeepsTrees, Method, Source};
 use crate::error::Result;
 use crate::geometry::Bounds;
+use crate::ritree::{Loaded, Unreadable};
 use crate::scene::Scene;
 use crate::study::Study;
 use block::FieldAtWork;
@@ -118,6 +121,16 @@ pub struct Dose<'a> {
     bounds: Vec<Bounds>,
     /// The first block of each field, and the number of all.
     first_blocks: Vec<u64>,
+}
+
+impl KeepsTrees for Dose<'_> {
+    fn save_trees(&self, out: &mut dyn io::Write) -> io::Result<()> {
+        kept::save(&self.tracers.iter().filter_map(Tracer::forest).collect::<Vec<_>>(), out)
+    }
+
+    fn load_trees(&mut self, source: &mut dyn Source) -> Result<Loaded, Unreadable> {
+        kept::load(&mut self.tracers.iter_mut().filter_map(Tracer::forest_mut).collect::<Vec<_>>(), source)
+    }
 }
 
 impl<'a> Dose<'a> {

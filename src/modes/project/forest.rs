@@ -1,5 +1,9 @@
 //! The RI-trees of a run: one per organ, made when the first ray reaches it, under one cache.
 
+pub mod choice;
+pub mod kept;
+mod queries;
+
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{OnceLock, PoisonError, RwLock, RwLockReadGuard};
 
@@ -11,7 +15,11 @@ use crate::exact::{Body, Spans};
 use crate::geometry::{Interval, RayGrid, Region, Segment};
 use crate::linespace::LineSpace;
 use crate::modes::project::Found;
-use crate::ritree::{Answer, BuildCounts, Cache, Descent, FittedTree, Parameters, Reason, RiTree, TreeShape};
+use crate::ritree::{
+    Answer, BuildCounts, Cache, Descent, FittedTree, Loaded, Parameters, Reason, RiTree, TreeShape,
+};
+pub use choice::{Demand, Estimate};
+pub use queries::QueryCounts;
 
 /// How lengths between samples are found.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -55,16 +63,10 @@ pub struct TreeSettings {
     /// Whether bodies that are not convex have trees of squared chords. In images, where the raster is quicker than trees that
     /// leave their outlines to be traced, that pays for bodies of many more faces than pixels only.
     pub general_bodies: bool,
+    /// What the study asks, if only those bodies are to be put in trees for which that is the [quicker](Estimate).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub demand: Option<Demand>,
 }
-
-/// From so many face planes on, and for so many rays, trees of squared chords are quicker than the exact engines: an
-/// ellipsoid of 200 432 faces takes them 0.25 s in place of 0.33 s for eight views of 2048 × 2048 on two threads, but
-/// 0.126 s in place of 0.048 s for one. At 20 000 faces, and on organs with creases, the exact engines are the quicker
-/// ones: at 20 048 faces, trees take twice as long for a first view of 600 × 600, and two thirds as long for later ones.
-pub const LEAST_PLANES_WHERE_QUICKER: usize = 200_000;
-
-/// See [`LEAST_PLANES_WHERE_QUICKER`].
-pub const LEAST_RAYS_WHERE_QUICKER: u64 = 30_000_000;
 
 impl Default for TreeSettings {
     fn default() -> Self {
@@ -74,55 +76,7 @@ impl Default for TreeSettings {
             kept_share: 0.3,
             least_planes: 48,
             general_bodies: true,
-        }
-    }
-}
-
-/// What became of the rays that asked trees.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct QueryCounts {
-    /// Queries of trees.
-    pub queries: u64,
-    /// Answered by interpolation, or by the proof that the cell is empty or that the line passes the box by.
-    pub interpolated: u64,
-    /// Traced: the cell lies across the body's outline.
-    pub traced_silhouette: u64,
-    /// Traced: more than two classes.
-    pub traced_classes: u64,
-    /// Traced: directions too far apart.
-    pub traced_angle: u64,
-    /// Traced: all corners miss, but the cell is not proved empty.
-    pub traced_guard: u64,
-    /// Not asked: the source or the target lies within the organ's box, so the whole line's chord does not serve.
-    pub traced_source_or_target_inside: u64,
-    /// Traced: the model of the squared chord may be off by more than the tolerance, as along the body's outline.
-    pub traced_tolerance: u64,
-    /// Not asked: the body has no tree, as it is not convex, or has so few faces that clipping is cheaper.
-    pub traced_without_tree: u64,
-}
-
-impl std::ops::AddAssign for QueryCounts {
-    fn add_assign(&mut self, other: Self) {
-        self.queries += other.queries;
-        self.interpolated += other.interpolated;
-        self.traced_silhouette += other.traced_silhouette;
-        self.traced_classes += other.traced_classes;
-        self.traced_angle += other.traced_angle;
-        self.traced_guard += other.traced_guard;
-        self.traced_tolerance += other.traced_tolerance;
-        self.traced_source_or_target_inside += other.traced_source_or_target_inside;
-        self.traced_without_tree += other.traced_without_tree;
-    }
-}
-
-impl QueryCounts {
-    pub(super) fn trace(&mut self, reason: Reason) {
-        match reason {
-            Reason::Silhouette => self.traced_silhouette += 1,
-            Reason::Classes => self.traced_classes += 1,
-            Reason::Angle => self.traced_angle += 1,
-            Reason::Guard => self.traced_guard += 1,
-            Reason::Tolerance => self.traced_tolerance += 1,
+            demand: None,
         }
     }
 }
@@ -142,6 +96,9 @@ pub struct ForestReport {
     pub tree_bytes: usize,
     /// The most they may be.
     pub cache_bytes: usize,
+    /// What was read of trees of an earlier run, if any were.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub loaded: Option<Loaded>,
 }
 
 /// The tree of one organ.
@@ -161,17 +118,22 @@ macro_rules! either {
         }
     };
 }
+use either;
 
 /// One tree per organ, under one cache.
 pub struct Forest<'a> {
     trees: RwLock<Vec<OnceLock<OrganTree<'a>>>>,
     bodies: Vec<&'a Body>,
+    /// What each is estimated to take, if that decides.
+    estimates: Vec<Option<Estimate>>,
     settings: TreeSettings,
     /// Whether it is asked where chords lie, besides their lengths.
     wants_places: bool,
     cache: Cache,
     /// Tiles so far: the time of all trees.
     clock: AtomicU32,
+    /// What was read of trees of an earlier run.
+    loaded: Option<Loaded>,
 }
 
 /// The tree of one organ, asked for one ray after another.
@@ -200,7 +162,18 @@ impl<'a> Forest<'a> {
     pub fn new(bodies: Vec<&'a Body>, settings: TreeSettings, wants_places: bool) -> Self {
         let trees = RwLock::new(bodies.iter().map(|_| OnceLock::new()).collect());
         let cache = Cache::new(settings.cache_bytes);
-        Self { trees, bodies, settings, wants_places, cache, clock: AtomicU32::new(1) }
+        let estimate = |body: &&Body| settings.demand.map(|demand| Estimate::of(body, &settings, demand));
+        let estimates = bodies.iter().map(estimate).collect();
+        Self {
+            trees,
+            bodies,
+            estimates,
+            settings,
+            wants_places,
+            cache,
+            clock: AtomicU32::new(1),
+            loaded: None,
+        }
     }
 
     /// Whether an organ's body is put in a tree.
@@ -212,7 +185,14 @@ impl<'a> Forest<'a> {
             Err(_) if self.settings.general_bodies && self.finds_runs() => body.surface().mesh().faces.len(),
             Err(_) => return false,
         };
-        planes >= self.settings.least_planes && LineSpace::new(body.bounds()).is_some()
+        planes >= self.settings.least_planes
+            && self.estimates[organ].is_none_or(|estimate| estimate.prefers_tree())
+            && LineSpace::new(body.bounds()).is_some()
+    }
+
+    /// What an organ is estimated to take, if that decides how it is found.
+    pub fn estimate(&self, organ: usize) -> Option<Estimate> {
+        self.estimates[organ]
     }
 
     fn new_tree(&self, organ: usize) -> Option<OrganTree<'a>> {
@@ -269,6 +249,7 @@ impl<'a> Forest<'a> {
         let mut report = ForestReport {
             tree_bytes: self.cache.used_bytes(),
             cache_bytes: self.cache.limit_bytes(),
+            loaded: self.loaded,
             ..ForestReport::default()
         };
         for tree in grove.trees.iter().filter_map(OnceLock::get) {

@@ -14,6 +14,7 @@ mod spot_check;
 pub(super) mod sweep;
 mod tile;
 
+use std::io;
 use std::ops::AddAssign;
 
 use rayon::prelude::*;
@@ -25,12 +26,13 @@ use crate::exact::Engine;
 use crate::geometry::Region;
 use crate::physics::{Attenuator, PhotonNoise};
 use crate::scene::{Scene, View};
+pub use forest::kept::{KeepsTrees, Source};
 pub use forest::{
-    DEFAULT_TOLERANCE_MM, ForestReport, Interpolation, LEAST_PLANES_WHERE_QUICKER, LEAST_RAYS_WHERE_QUICKER,
-    QueryCounts, TreeSettings,
+    DEFAULT_TOLERANCE_MM, Demand, Estimate, ForestReport, Interpolation, QueryCounts, TreeSettings,
 };
 
-use forest::Forest;
+use crate::ritree::{Loaded, Unreadable};
+use forest::{Forest, kept};
 use tile::TileTracer;
 
 /// Side of a tile, pixels: its rays' lengths for a few organs fit the second-level cache, and 1024² pixels make 256 tiles.
@@ -66,19 +68,17 @@ pub enum Method {
     Exact(Option<Engine>),
     /// By one RI-tree per convex organ, whose samples are exact chords; what it does not interpolate is exact.
     RiTree(TreeSettings),
-    /// By a tree where it was measured to be the quicker, by the quickest exact engine elsewhere: trees grow for bodies of
-    /// [`LEAST_PLANES_WHERE_QUICKER`] face planes or more, see [`for_rays`](Self::for_rays).
+    /// By a tree where that is [estimated](Estimate) to be the quicker for what the study asks, see
+    /// [`for_views`](Self::for_views); by the quickest exact engine elsewhere.
     Auto(TreeSettings),
 }
 
 impl Method {
-    /// The method for a study of so many rays: of few, `Auto` makes no trees, unless told from how many planes on.
-    pub fn for_rays(self, rays: u64) -> Self {
+    /// The method for a study of these views: of them `Auto` is to know, unless it was told to put all bodies in trees.
+    pub fn for_views(self, views: &[View]) -> Self {
         match self {
-            Self::Auto(trees)
-                if rays < LEAST_RAYS_WHERE_QUICKER && trees.least_planes == LEAST_PLANES_WHERE_QUICKER =>
-            {
-                Self::Auto(TreeSettings { least_planes: usize::MAX, ..trees })
+            Self::Auto(trees) if trees.demand.is_some() => {
+                Self::Auto(TreeSettings { demand: Some(Demand::of(views)), ..trees })
             }
             other => other,
         }
@@ -144,6 +144,12 @@ impl<'a> Projector<'a> {
         self.forest.as_ref().map(Forest::report)
     }
 
+    /// What an organ is estimated to take, and whether it is put in a tree; if the method is to choose.
+    pub fn estimate(&self, organ: usize) -> Option<(Estimate, bool)> {
+        let forest = self.forest.as_ref()?;
+        Some((forest.estimate(organ)?, forest.grows(organ)))
+    }
+
     /// Checks every tree from its root to its leaves. For tests: it samples every corner anew.
     ///
     /// # Panics
@@ -180,6 +186,16 @@ impl<'a> Projector<'a> {
         }
         let engines = tracer.engines();
         Ok(Projection { columns, rows, tiles, counts, queries, engines })
+    }
+}
+
+impl KeepsTrees for Projector<'_> {
+    fn save_trees(&self, out: &mut dyn io::Write) -> io::Result<()> {
+        kept::save(&self.forest.iter().collect::<Vec<_>>(), out)
+    }
+
+    fn load_trees(&mut self, source: &mut dyn Source) -> Result<Loaded, Unreadable> {
+        kept::load(&mut self.forest.iter_mut().collect::<Vec<_>>(), source)
     }
 }
 

@@ -1,12 +1,13 @@
 //! The files of a benchmark: a page to look at, plots, and all figures as JSON and CSV.
 //!
-//! | `bench curve` | `bench scale` | `bench paper` | content |
-//! |---|---|---|---|
-//! | `curve.html` | `scale.html` | `paper.html` | the report: one file, no network, no script |
-//! | `curve.csv` | `scale.csv` | `paper.csv` | a row for each method, setting and size |
-//! | `curve-cold.svg`, `curve-warm.svg` | `scale-faces.svg` … | `paper-tomatoes-distance-error.svg` … | its plots |
-//! | `curve.json` | `scale.json` | `paper.json` | all figures; written last, so a folder without it holds an unfinished run |
+//! | `bench curve` | `bench scale` | `bench paper` | `bench choice` | content |
+//! |---|---|---|---|---|
+//! | `curve.html` | `scale.html` | `paper.html` | `choice.html` | the report: one file, no network, no script |
+//! | `curve.csv` | `scale.csv` | `paper.csv` | `choice.csv` | a row for each method, setting and size |
+//! | `curve-cold.svg`, `curve-warm.svg` | `scale-faces.svg` … | `paper-tomatoes-distance-error.svg` … | | its plots |
+//! | `curve.json` | `scale.json` | `paper.json` | `choice.json` | all figures; written last, so a folder without it holds an unfinished run |
 
+mod choice;
 mod curve;
 mod paper;
 mod scale;
@@ -19,6 +20,7 @@ use super::page::{escape, short};
 use super::{create_folder, json, remove_stale, write_atomically};
 use crate::error::Result;
 
+use crate::modes::bench::choice::ChoiceReport;
 use crate::modes::bench::curve::CurveReport;
 use crate::modes::bench::paper::PaperReport;
 use crate::modes::bench::scale::ScaleReport;
@@ -38,6 +40,19 @@ pub fn write_curve(folder: &Path, report: &CurveReport) -> Result<()> {
 /// The first file that cannot be written. Files are whole or absent.
 pub fn write_scale(folder: &Path, report: &ScaleReport) -> Result<()> {
     write(folder, "scale", &scale::files(report), report)
+}
+
+/// Writes the files of a study of choices into `folder`, which is made if missing.
+///
+/// # Errors
+/// The first file that cannot be written. Files are whole or absent.
+pub fn write_choice(folder: &Path, report: &ChoiceReport) -> Result<()> {
+    write(folder, "choice", &choice::files(report), report)
+}
+
+/// The table of choices as text.
+pub fn choice_table(report: &ChoiceReport) -> String {
+    choice::table(report)
 }
 
 /// Writes the files of the paper's tables and figures into `folder`, which is made if missing.

@@ -1,0 +1,147 @@
+//! Which organs are put in trees, if the method is to choose: those for which a small model of costs says that a tree is the
+//! quicker for what the study asks.
+//!
+//! The exact side is the engines' own estimate, see [`Body::image_cost`]; that of a tree is
+//!
+//! | for each | is paid for |
+//! |---|---|
+//! | face | the walker's tables, by which leaves are sampled |
+//! | view | making the body ready, and what leaves it is the first to ask for: ever fewer |
+//! | pixel | evaluating leaves, and tracing what they do not know |
+//!
+//! Only ratios of costs matter. `chordfield bench choice` measures how far the choices are from the best.
+
+use serde::Serialize;
+
+use super::{DEFAULT_TOLERANCE_MM, Interpolation, TreeSettings};
+use crate::exact::{Body, Engine, ImageCost};
+use crate::geometry::RayGrid;
+use crate::scene::View;
+
+/// What a study asks of its organs: so many views like one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Demand {
+    /// Views.
+    pub views: u64,
+    /// Pixels of all views.
+    pub pixels: u64,
+    /// The rays of the view that stands for all. `None` if there are no views.
+    #[serde(skip)]
+    pub grid: Option<RayGrid>,
+}
+
+impl Demand {
+    /// That of a study of these views, of which the first stands for all.
+    pub fn of(views: &[View]) -> Self {
+        Self {
+            views: views.len() as u64,
+            pixels: views.iter().map(View::pixels).sum(),
+            grid: views.first().map(|view| *view.rays()),
+        }
+    }
+}
+
+/// What an organ is estimated to take, which decides how it is found.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Estimate {
+    /// The quickest exact engine.
+    pub engine: Engine,
+    /// By that engine, seconds of one thread.
+    pub exact_s: f64,
+    /// By a tree, grown from nothing, seconds of one thread.
+    pub tree_s: f64,
+}
+
+/// Nanoseconds of one thread: from times of ellipsoids of 20 480 and 327 680 faces, one view of 600 × 600 and one of 2048 × 2048, cold
+/// and warm (`cargo bench --bench trees` in `benches`), at the loosest tolerance that errs by a thousandth of the mean chord.
+mod cost {
+    /// To make the walker's tables, for each face of a body that the processor's cache holds.
+    pub const FACE: f64 = 170.0;
+    /// The same for larger bodies.
+    pub const FAR_FACE: f64 = 525.0;
+    /// From so many faces on.
+    pub const FAR: f64 = 50_000.0;
+    /// To grow what the first view asks.
+    pub const GROWTH: f64 = 2.1e6;
+    /// To make the body ready for a view.
+    pub const VIEW: f64 = 0.5e6;
+    /// To evaluate leaves, for each pixel of the body's rectangle.
+    pub const PIXEL: f64 = 2.7;
+}
+
+/// Of the pixels of its rectangle, a round body meets so many.
+const MET: f64 = std::f64::consts::FRAC_PI_4;
+
+/// Facets of a body of F faces and radius r are off a smooth surface by some r/F; leaves that are to be within a tolerance of
+/// them do not know the lines whose chord is shorter than this times r/F over the tolerance, in longest chords.
+const FACETS: f64 = 20.0;
+
+/// A tree is chosen if its estimate, times this, is less than the exact one: organs may have creases, which it does not know of.
+const DOUBT: f64 = 1.1;
+
+impl Estimate {
+    /// For an organ in a study.
+    pub fn of(body: &Body, trees: &TreeSettings, demand: Demand) -> Self {
+        let Some(grid) = &demand.grid else {
+            // Single rays, of which no tree is known to make up for its growth.
+            return Self { engine: body.engine_for_rays(), exact_s: 0.0, tree_s: f64::INFINITY };
+        };
+        let image = body.image_cost(grid);
+        let tree_s = match trees.interpolation {
+            Interpolation::SquaredChord { tolerance_mm } => {
+                1e-9 * tree_ns(body, &image, tolerance_mm, demand.views as f64)
+            }
+            // The paper's trees are never the quicker.
+            Interpolation::Quadrilinear { .. } => f64::INFINITY,
+        };
+        Self { engine: image.engine, exact_s: 1e-9 * image.ns * demand.views as f64, tree_s }
+    }
+
+    /// Whether the tree is the quicker.
+    pub fn prefers_tree(&self) -> bool {
+        DOUBT * self.tree_s < self.exact_s
+    }
+}
+
+fn tree_ns(body: &Body, image: &ImageCost, tolerance_mm: f64, views: f64) -> f64 {
+    let faces = body.surface().mesh().faces.len() as f64;
+    let radius = body.bounds().size().element_sum() / 6.0;
+    // Lines are spread evenly over squared chords.
+    let traced = (FACETS * radius / (faces * tolerance_mm)).powi(2).min(1.0);
+    // Half the error takes cells 2^¼ times as small, of which a view meets √2 times as many; later views meet many of the first
+    // one's.
+    let leaves = views.sqrt() * (DEFAULT_TOLERANCE_MM / tolerance_mm).sqrt();
+    let face = if faces < cost::FAR { cost::FACE } else { cost::FAR_FACE };
+    let of_view = cost::VIEW + image.pixels * (cost::PIXEL + MET * traced * image.walked_pixel_ns);
+    faces * face + leaves * cost::GROWTH + views * of_view
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::ClosedMesh;
+    use crate::geometry::primitives::icosphere;
+    use crate::scene::Scene;
+
+    #[test]
+    fn trees_are_for_many_faces_many_views_and_tolerances_that_facets_allow() {
+        let body = |subdivisions| {
+            let mesh = icosphere(subdivisions).map_vertices(|v| v * glam::DVec3::new(98.0, 78.0, 58.0));
+            Body::new(ClosedMesh::new(mesh).expect("closed").0)
+        };
+        let [few, many] = [body(2), body(6)];
+        let views = Scene::phantom("calibration").expect("a scene").beam.views().expect("views");
+        let prefers = |body: &Body, tolerance_mm: f64, count: u64| {
+            let interpolation = Interpolation::SquaredChord { tolerance_mm };
+            let trees = TreeSettings { interpolation, ..TreeSettings::default() };
+            let demand = Demand { views: count, ..Demand::of(&views) };
+            Estimate::of(body, &trees, demand).prefers_tree()
+        };
+        assert!(prefers(&many, 0.5, 64));
+        assert!(!prefers(&many, 0.5, 1), "the walker's tables take longer than the view");
+        assert!(!prefers(&many, 0.02, 64), "its facets are rougher than that");
+        assert!(!prefers(&few, 0.5, 64), "so are these");
+        let none = Estimate::of(&many, &TreeSettings::default(), Demand::default());
+        assert!(!none.prefers_tree(), "nothing is asked");
+    }
+}
