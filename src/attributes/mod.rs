@@ -3,5 +3,6 @@
 pub mod chord;
 pub mod exit_ray;
 pub mod lines;
+pub mod memo;
 pub mod squared_chord;
 pub mod surface;
