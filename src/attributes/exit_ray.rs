@@ -3,7 +3,8 @@
 use std::marker::PhantomData;
 
 use super::lines::SurfaceLines;
-use super::surface::{Lights, Seen, blend, f32s, vector};
+use super::memo::Memo;
+use super::surface::{Lights, Seen, blend, distance, f32s, vector};
 use crate::geometry::{Ray, Real, Vec3};
 use crate::linespace::{Cell, LinePoint, PlanePair};
 use crate::ritree::Attribute;
@@ -47,13 +48,14 @@ pub struct ExitRay<'a, L, R> {
     lights: L,
     optics: Optics,
     limit: u32,
+    memo: Memo<Through>,
     number: PhantomData<R>,
 }
 
 impl<'a, L: Lights, R: Real> ExitRay<'a, L, R> {
     /// The exit rays of a surface, after at most `limit` turns.
     pub fn new(lines: SurfaceLines<'a>, lights: L, optics: Optics, limit: u32) -> Self {
-        Self { lines, lights, optics, limit, number: PhantomData }
+        Self { lines, lights, optics, limit, memo: Memo::default(), number: PhantomData }
     }
 
     /// The surface's lines.
@@ -67,15 +69,7 @@ impl<L: Lights, R: Real> Attribute for ExitRay<'_, L, R> {
     type Real = R;
 
     fn sample(&self, line: LinePoint) -> Through {
-        let ray = self.lines.ray::<R>(line);
-        let surface = self.lines.surface();
-        let Some(hit) = surface.hit(&ray, Reach::whole()) else { return Through::MISS };
-        let path = follow(surface, &ray, hit, self.optics, self.limit);
-        let depth = self.lines.depth(hit.place(&ray), line.pair);
-        let seen = Seen::of(&hit, depth, self.lights.hidden(&ray, &hit));
-        let (exit_point, exit_dir) =
-            path.exit.map_or(([0.0; 3], [0.0; 3]), |exit| (f32s(exit.origin), f32s(exit.dir)));
-        Through { seen, way: path.turns.min(0xff) | path.last_class << 8, exit_point, exit_dir }
+        self.memo.recall(line, || self.trace(line))
     }
 
     fn class(&self, output: &Through) -> u32 {
@@ -87,8 +81,12 @@ impl<L: Lights, R: Real> Attribute for ExitRay<'_, L, R> {
         class == 0
     }
 
-    /// The distance of the exit rays in line space (§2.3); of rays that do not leave, that of the hits' depths.
+    /// The distance of the exit rays in line space (§2.3); of rays that do not leave, that of the hits' depths. A plain mirror
+    /// turns the ray itself at the interpolated place, by twice what the normal is off.
     fn distance(&self, a: &Through, b: &Through) -> f64 {
+        if self.is_plain_mirror(a) && self.is_plain_mirror(b) {
+            return distance::<R>(&a.seen, &b.seen, 2.0);
+        }
         match (a.exit::<R>(), b.exit::<R>()) {
             (Some(a), Some(b)) => self.lines.ray_distance(&a, &b),
             _ => f64::from(a.seen.depth - b.seen.depth).abs(),
@@ -123,6 +121,18 @@ impl<L: Lights, R: Real> Attribute for ExitRay<'_, L, R> {
 }
 
 impl<L: Lights, R: Real> ExitRay<'_, L, R> {
+    fn trace(&self, line: LinePoint) -> Through {
+        let ray = self.lines.ray::<R>(line);
+        let surface = self.lines.surface();
+        let Some(hit) = surface.hit(&ray, Reach::whole()) else { return Through::MISS };
+        let path = follow(surface, &ray, hit, self.optics, self.limit);
+        let depth = self.lines.depth(hit.place(&ray), line.pair);
+        let seen = Seen::of(&hit, depth, self.lights.hidden(&ray, &hit));
+        let (exit_point, exit_dir) =
+            path.exit.map_or(([0.0; 3], [0.0; 3]), |exit| (f32s(exit.origin), f32s(exit.dir)));
+        Through { seen, way: path.turns.min(0xff) | path.last_class << 8, exit_point, exit_dir }
+    }
+
     fn is_plain_mirror(&self, output: &Through) -> bool {
         self.optics == Optics::Mirror && output.turns() == 1
     }

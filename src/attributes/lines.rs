@@ -8,10 +8,16 @@ use crate::linespace::{Cell, LinePoint, LineSpace, PlanePair};
 use crate::surface::Surface;
 
 /// A surface with the line space of a cube around it and the points of its hull.
+///
+/// Trees of surfaces know a line by where it meets the plane midway between the pair's two and by its slopes, each scaled to
+/// the range of an intercept: a sheared view of the same four dimensions. A camera's rays differ much in place and little in
+/// slope, so that they pass through a quarter of the cells that they need in intercepts of two planes, and the root holds
+/// fewer lines that miss the cube.
 #[derive(Clone, Debug)]
 pub struct SurfaceLines<'a> {
     surface: &'a Surface,
     space: LineSpace,
+    middle: DVec3,
     hull: Vec<DVec3>,
 }
 
@@ -25,7 +31,7 @@ impl<'a> SurfaceLines<'a> {
         let space = LineSpace::new(Bounds { min: bounds.centre() - half, max: bounds.centre() + half })?;
         let points = surface.hull_points();
         let hull = convex_hull(&points).map_or(points, |mesh| mesh.vertices);
-        Some(Self { surface, space, hull })
+        Some(Self { surface, space, middle: bounds.centre(), hull })
     }
 
     /// The surface.
@@ -38,9 +44,43 @@ impl<'a> SurfaceLines<'a> {
         &self.space
     }
 
+    /// A ray's line as its tree knows it.
+    pub fn point<R: Real>(&self, ray: &Ray<R>) -> LinePoint {
+        let pair = self.space.pair_of(ray.dir);
+        let [k, i, j] = pair.axes();
+        let side = R::of(1.0 / self.space.size()[k]);
+        let over = R::of(1.0) / ray.dir.axis(k);
+        let at = |axis: usize| (ray.origin.axis(axis) - R::of(self.middle[axis])) * side;
+        let slope = [ray.dir.axis(i) * over, ray.dir.axis(j) * over];
+        let depth = at(k);
+        let off = [at(i) - depth * slope[0], at(j) - depth * slope[1]];
+        let half = R::of(0.5);
+        let stuv = [
+            half + off[0] * R::of(OFFSET_SCALE),
+            half + off[1] * R::of(OFFSET_SCALE),
+            half + slope[0] * R::of(SLOPE_SCALE),
+            half + slope[1] * R::of(SLOPE_SCALE),
+        ];
+        LinePoint { pair, stuv: stuv.map(R::get) }
+    }
+
     /// A sample's line as a ray from its front plane, outside the object.
     pub fn ray<R: Real>(&self, line: LinePoint) -> Ray<R> {
-        self.space.ray_of(line.pair, line.stuv.map(R::of))
+        let [k, i, j] = line.pair.axes();
+        let along = if line.pair.is_reversed() { -1.0 } else { 1.0 };
+        let side = self.space.size()[k];
+        let [x, y, p, q] = line.stuv.map(|c| R::of(c) - R::of(0.5));
+        let (x, y) = (x * R::of(side / OFFSET_SCALE), y * R::of(side / OFFSET_SCALE));
+        let (p, q) = (p * R::of(1.0 / SLOPE_SCALE), q * R::of(1.0 / SLOPE_SCALE));
+        let back = R::of(-0.5 * along * side);
+        let vector = |on_i: R, on_j: R, on_k: R| {
+            let mut v = [on_k; 3];
+            (v[i], v[j]) = (on_i, on_j);
+            Vec3::new(v[0], v[1], v[2])
+        };
+        let origin = Vec3::of(self.middle) + vector(x + p * back, y + q * back, back);
+        let dir = vector(p * R::of(along), q * R::of(along), R::of(along)).normalized();
+        Ray { origin, dir }
     }
 
     /// Where a ray's line lies in line space.
@@ -75,14 +115,43 @@ impl<'a> SurfaceLines<'a> {
         squares.fold(R::of(0.0), |sum, x| sum + x).sqrt().get()
     }
 
-    /// Whether no line of the cell meets the surface, proved: a plane of the cell's [shaft](Cell::shaft_planes) has all of the
-    /// hull behind it.
+    /// Whether no line of the cell meets the surface, proved: all of the hull lies on one side of what the lines reach,
+    /// seen along one of eight directions across the axis.
     pub fn is_certainly_empty<R: Real>(&self, pair: PlanePair, cell: &Cell) -> bool {
-        let (min, size) = (self.space.min(), self.space.size());
-        cell.shaft_planes(pair).any(|(normal, least)| {
-            let n = Vec3::<R>::of(normal / size);
-            let limit = least - LEAST_SEPARATION + n.dot(Vec3::of(min)).get();
-            self.hull.iter().all(|&p| n.dot(Vec3::of(p)).get() < limit)
+        const ACROSS: [[f64; 2]; 8] = [
+            [1.0, 0.0],
+            [-1.0, 0.0],
+            [0.0, 1.0],
+            [0.0, -1.0],
+            [1.0, 1.0],
+            [1.0, -1.0],
+            [-1.0, 1.0],
+            [-1.0, -1.0],
+        ];
+        let [k, i, j] = pair.axes();
+        let side = self.space.size()[k];
+        let unit = |axis: usize, x: f64| (x - 0.5) / if axis < 2 { OFFSET_SCALE } else { SLOPE_SCALE };
+        let low: [f64; 4] = std::array::from_fn(|a| unit(a, cell.low[a]));
+        let high: [f64; 4] = std::array::from_fn(|a| unit(a, cell.high[a]));
+        ACROSS.into_iter().any(|[a, b]| {
+            let least = |w: f64, axis: usize| w * if w > 0.0 { low[axis] } else { high[axis] };
+            let most = |w: f64, axis: usize| w * if w > 0.0 { high[axis] } else { low[axis] };
+            let off = least(a, 0) + least(b, 1) - LEAST_SEPARATION;
+            let (flattest, steepest) = (least(a, 2) + least(b, 3), most(a, 2) + most(b, 3));
+            self.hull.iter().all(|&p| {
+                let p = (Vec3::of(p) - Vec3::of(self.middle)) * R::of(1.0 / side);
+                let across = R::of(a) * p.axis(i) + R::of(b) * p.axis(j);
+                let depth = p.axis(k);
+                // The least that a line has at that depth: by the least slope before the middle and the greatest behind.
+                let slope = if depth.get() > 0.0 { flattest } else { steepest };
+                across < R::of(off) + depth * R::of(slope)
+            })
         })
     }
 }
+
+/// Lines through the cube meet the plane midway at most a side off its middle: that fills the range of intercepts.
+const OFFSET_SCALE: f64 = 1.5;
+
+/// Slopes are at most 1, and take half the range: what a camera's rays meet changes less with the slope than with the place.
+const SLOPE_SCALE: f64 = 0.75;

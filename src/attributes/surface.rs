@@ -3,6 +3,7 @@
 use std::marker::PhantomData;
 
 use super::lines::SurfaceLines;
+use super::memo::Memo;
 use crate::geometry::{Ray, Real, Vec3};
 use crate::linespace::{Cell, LinePoint, PlanePair};
 use crate::ritree::Attribute;
@@ -57,6 +58,13 @@ pub(super) fn blend<'a, R: Real>(parts: impl Iterator<Item = (R, &'a [f32; 3])>)
     parts.fold(Vec3::default(), |sum, (weight, v)| sum + vector(*v) * weight)
 }
 
+/// How far two hits of one line are apart, box units, where a turn of the normal counts `leverage` times.
+pub(super) fn distance<R: Real>(a: &Seen, b: &Seen, leverage: f64) -> f64 {
+    let turned = (vector::<R>(a.normal) - vector(b.normal)) * R::of(leverage);
+    let moved = R::of(a.depth.into()) - R::of(b.depth.into());
+    (moved * moved + turned.dot(turned)).sqrt().get()
+}
+
 /// Which lights of up to eight an object hides from a hit on itself, a bit each. A place that is lit from behind is not
 /// hidden: it is dark by its normal.
 pub trait Lights: Sync {
@@ -68,13 +76,22 @@ pub trait Lights: Sync {
 pub struct FirstHit<'a, L, R> {
     lines: SurfaceLines<'a>,
     lights: L,
+    memo: Memo<Seen>,
     number: PhantomData<R>,
 }
 
 impl<'a, L: Lights, R: Real> FirstHit<'a, L, R> {
     /// The first hits on a surface under lights.
     pub fn new(lines: SurfaceLines<'a>, lights: L) -> Self {
-        Self { lines, lights, number: PhantomData }
+        Self { lines, lights, memo: Memo::default(), number: PhantomData }
+    }
+
+    fn trace(&self, line: LinePoint) -> Seen {
+        let ray = self.lines.ray::<R>(line);
+        self.lines.surface().hit(&ray, Reach::whole()).map_or(Seen::MISS, |hit| {
+            let depth = self.lines.depth(hit.place(&ray), line.pair);
+            Seen::of(&hit, depth, self.lights.hidden(&ray, &hit))
+        })
     }
 
     /// The surface's lines.
@@ -88,11 +105,7 @@ impl<L: Lights, R: Real> Attribute for FirstHit<'_, L, R> {
     type Real = R;
 
     fn sample(&self, line: LinePoint) -> Seen {
-        let ray = self.lines.ray::<R>(line);
-        self.lines.surface().hit(&ray, Reach::whole()).map_or(Seen::MISS, |hit| {
-            let depth = self.lines.depth(hit.place(&ray), line.pair);
-            Seen::of(&hit, depth, self.lights.hidden(&ray, &hit))
-        })
+        self.memo.recall(line, || self.trace(line))
     }
 
     fn class(&self, output: &Seen) -> u32 {
@@ -106,9 +119,7 @@ impl<L: Lights, R: Real> Attribute for FirstHit<'_, L, R> {
     /// The paper's distance is that of the rays (point, normal) in line space. On one line that is, but for slopes of at
     /// most 1, how far the points and the normals' ends are apart, box units.
     fn distance(&self, a: &Seen, b: &Seen) -> f64 {
-        let turned = vector::<R>(a.normal) - vector(b.normal);
-        let moved = R::of(a.depth.into()) - R::of(b.depth.into());
-        (moved * moved + turned.dot(turned)).sqrt().get()
+        distance::<R>(a, b, 1.0)
     }
 
     fn interpolate(&self, parts: &[(R, &Seen)]) -> Seen {

@@ -167,11 +167,13 @@ impl Place {
                 Verdict::Split
             };
         }
-        if !is_deepest && !self.middle_is_near(attribute, corners, class, parameters.distance_threshold) {
-            return Verdict::Split;
+        // Smaller cells hold directions nearer to each other.
+        let is_wide = spread_exceeds(attribute, corners.iter(), parameters.angular_threshold_deg);
+        if is_deepest {
+            return Verdict::Final(if is_wide { Kind::Traced(Reason::Angle) } else { Kind::Smooth });
         }
-        if spread_exceeds(attribute, corners.iter(), parameters.angular_threshold_deg) {
-            return Verdict::Final(Kind::Traced(Reason::Angle));
+        if is_wide || !self.middle_is_near(attribute, corners, class, parameters.distance_threshold) {
+            return Verdict::Split;
         }
         Verdict::Final(Kind::Smooth)
     }

@@ -54,12 +54,22 @@ impl SmoothMesh {
     /// The nearest hit within reach. `None` if there is none. Shared edges are counted in at least one face (Woop, Benthin
     /// & Wald 2013: signs of edges are the same numbers from both sides).
     pub fn hit<R: Real>(&self, ray: &Ray<R>, reach: Reach<R>) -> Option<Hit<R>> {
+        self.search(ray, reach, false)
+    }
+
+    /// Whether there is a hit within reach.
+    pub fn is_met<R: Real>(&self, ray: &Ray<R>, reach: Reach<R>) -> bool {
+        self.search(ray, reach, true).is_some()
+    }
+
+    fn search<R: Real>(&self, ray: &Ray<R>, reach: Reach<R>, any: bool) -> Option<Hit<R>> {
         let d = ray.dir.get().abs();
         let k = if d.x >= d.y && d.x >= d.z { 0 } else { 1 + usize::from(d.z > d.y) };
         let axes = [(k + 1) % 3, (k + 2) % 3, k];
         let along = ray.dir.axis(k);
         let shear = [ray.dir.axis(axes[0]) / along, ray.dir.axis(axes[1]) / along];
-        let mut search = Nearest { mesh: self, ray, slabs: Slabs::new(ray), axes, shear, reach, best: None };
+        let mut search =
+            Nearest { mesh: self, ray, slabs: Slabs::new(ray), axes, shear, reach, best: None, any };
         self.tree.search(&mut search);
         search.best
     }
@@ -73,6 +83,8 @@ struct Nearest<'a, R> {
     shear: [R; 2],
     reach: Reach<R>,
     best: Option<Hit<R>>,
+    /// Whether any hit ends the search.
+    any: bool,
 }
 
 impl<R: Real> Search for Nearest<'_, R> {
@@ -116,7 +128,7 @@ impl<R: Real> Search for Nearest<'_, R> {
         for (weight, index) in weights.into_iter().zip(face) {
             normal = normal + Vec3::of(self.mesh.normals[index as usize]) * (weight / sum);
         }
-        self.reach.to = t;
+        self.reach.to = if self.any { R::of(f64::NEG_INFINITY) } else { t };
         let size = self.mesh.magnitude + self.ray.origin.get().abs().max_element();
         let error = gamma(32) * size;
         self.best = Some(Hit { t, normal: normal.normalized(), enters, class: 1, error });

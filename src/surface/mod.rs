@@ -134,6 +134,15 @@ impl Surface {
         }
     }
 
+    /// Whether there is a hit within reach: as [`hit`](Self::hit), but any will do.
+    pub fn is_met<R: Real>(&self, ray: &Ray<R>, reach: Reach<R>) -> bool {
+        match self {
+            Self::Shell(s) => s.is_met(ray, reach),
+            Self::Mesh(s) => s.is_met(ray, reach),
+            simple => simple.hit(ray, reach).is_some(),
+        }
+    }
+
     /// Points whose hull holds the surface.
     pub fn hull_points(&self) -> Vec<glam::DVec3> {
         match self {

@@ -50,9 +50,16 @@ impl Shell {
 
     /// The nearest hit within reach. `None` if there is none.
     pub fn hit<R: Real>(&self, ray: &Ray<R>, reach: Reach<R>) -> Option<Hit<R>> {
-        let mut search = Nearest { aim: Aim::new(self, ray), reach, best: None };
+        let mut search = Nearest { aim: Aim::new(self, ray), reach, best: None, any: false };
         self.tree.search(&mut search);
         search.best
+    }
+
+    /// Whether there is a hit within reach.
+    pub fn is_met<R: Real>(&self, ray: &Ray<R>, reach: Reach<R>) -> bool {
+        let mut search = Nearest { aim: Aim::new(self, ray), reach, best: None, any: true };
+        self.tree.search(&mut search);
+        search.best.is_some()
     }
 
     /// All hits of the whole ray, sorted; a hit on a shared edge counts once.
@@ -99,6 +106,8 @@ struct Nearest<'a, R> {
     aim: Aim<'a, R>,
     reach: Reach<R>,
     best: Option<Hit<R>>,
+    /// Whether any hit ends the search.
+    any: bool,
 }
 
 impl<R: Real> Search for Nearest<'_, R> {
@@ -116,10 +125,10 @@ impl<R: Real> Search for Nearest<'_, R> {
         if self.entry(&self.aim.shell.pieces[item as usize].bounds).is_none() {
             return;
         }
-        let (reach, best) = (&mut self.reach, &mut self.best);
+        let (reach, best, any) = (&mut self.reach, &mut self.best, self.any);
         self.aim.roots(item, |hit| {
             if reach.admits(hit.t, hit.enters) {
-                reach.to = hit.t;
+                reach.to = if any { R::of(f64::NEG_INFINITY) } else { hit.t };
                 *best = Some(Hit { normal: hit.normal.normalized(), ..hit });
             }
         });

@@ -6,10 +6,11 @@
 //!              └──── exit ray ◄─────────┘  mirrored · refracted · straight on, up to a limit
 //! ```
 //!
-//! Trees are asked for what is smooth: the first hit of a line with its normal, the ray that leaves a mirror or a glass
-//! body, and whether a line to a light meets an object. They are kept from view to view. Where they do not answer, where a
-//! ray starts within an object's box, and for objects without a tree, rays are traced. Colours are floats to the end; a
-//! pixel depends on its rays alone, so pictures are the same bits for any number of threads.
+//! Trees are asked for what is smooth, by rays from the camera on: the first hit of a line with its normal, the lights that
+//! the object hides from it, and the ray that leaves a mirror or a glass body. They are kept from view to view. Where they do
+//! not answer, where a ray starts within an object's box, for objects without a tree, after a turn, and to lights past other
+//! objects, rays are traced. Colours are floats to the end; a pixel depends on its rays alone, so pictures are the same bits
+//! for any number of threads.
 
 mod picture;
 mod seer;
@@ -163,6 +164,7 @@ impl<'a, R: Real> Renderer<'a, R> {
             cache: &self.cache,
             work: Work::default(),
             was_traced: false,
+            is_from_camera: true,
         };
         let mut tile = Tile::default();
         for (column, row) in region.places() {
@@ -170,7 +172,7 @@ impl<'a, R: Real> Renderer<'a, R> {
             let places = samples.of_pixel(column, row);
             let sum = places.iter().fold(Vec3::default(), |sum, [x, y]| {
                 let ray = camera.ray(size, f64::from(column) + x, f64::from(row) + y);
-                sum + light.radiance(&ray, R::of(1.0), None, 0)
+                sum + light.radiance(&ray, R::of(1.0), None, 0, true)
             });
             let mean = sum * R::of(1.0 / places.len() as f64);
             tile.colours.push(mean.get().as_vec3().to_array());
@@ -207,6 +209,9 @@ struct LightPath<'t, 'a, R: Real> {
     work: Work,
     /// Whether an object with a tree was traced.
     was_traced: bool,
+    /// Whether the ray runs as it left the camera: neighbours ask the same cells. Turned rays scatter over line space, and
+    /// the cells that a few of them would share cost more than tracing them.
+    is_from_camera: bool,
 }
 
 /// Light that would change a pixel by less than this, a quarter of the least step of eight bits, is not followed.
@@ -216,8 +221,16 @@ impl<R: Real> LightPath<'_, '_, R> {
     /// The light that comes along a ray; it makes up `share` of a pixel's. The object that the ray has `left` is not met
     /// again: mirrors and glass bodies let rays go only when they leave for good, and what a clear sheet has of itself
     /// behind it is not seen through it.
-    fn radiance(&mut self, ray: &Ray<R>, share: R, left: Option<usize>, turns: u32) -> Vec3<R> {
+    fn radiance(
+        &mut self,
+        ray: &Ray<R>,
+        share: R,
+        left: Option<usize>,
+        turns: u32,
+        is_straight: bool,
+    ) -> Vec3<R> {
         self.work.rays += 1;
+        self.is_from_camera = is_straight;
         let Some((object, sight)) = self.nearest(ray, left) else { return self.world.sky.seen(ray) };
         let seer = &self.seers[object];
         let material = seer.material();
@@ -229,7 +242,7 @@ impl<R: Real> LightPath<'_, '_, R> {
         let clear = R::of(material.clear);
         if is_worth(clear) {
             let on = Ray { origin: sight.place, dir: ray.dir };
-            light = light + self.radiance(&on, share * clear, Some(object), turns + 1) * clear;
+            light = light + self.radiance(&on, share * clear, Some(object), turns + 1, is_straight) * clear;
         }
         if let Some(glass) = material.glass
             && material.mirror > 0.0
@@ -241,13 +254,13 @@ impl<R: Real> LightPath<'_, '_, R> {
             if is_worth(part) {
                 let dir = reflected(ray.dir, sight.normal);
                 let on = Ray { origin: sight.place, dir };
-                light = light + self.radiance(&on, share * part, Some(object), turns + 1) * part;
+                light = light + self.radiance(&on, share * part, Some(object), turns + 1, false) * part;
             }
         }
         if let Some((on, inner_turns)) = seer.turned(ray, &sight) {
             let part = R::of(material.share(inner_turns));
             if is_worth(part) {
-                light = light + self.radiance(&on, share * part, Some(object), turns + 1) * part;
+                light = light + self.radiance(&on, share * part, Some(object), turns + 1, false) * part;
             }
         }
         light
@@ -273,8 +286,8 @@ impl<R: Real> LightPath<'_, '_, R> {
             return None;
         }
         if seer.has_tree() {
-            // The tree knows the first hit of the whole line: it serves where the line enters the box ahead.
-            if near.get() > 0.0 {
+            // The tree knows the first hit of the whole line: it serves where that lies ahead.
+            if self.is_from_camera && near.get() > 0.0 {
                 self.work.queries += 1;
                 if let Ok(answer) = seer.ask(ray, self.cache) {
                     self.work.interpolated += 1;
@@ -296,12 +309,13 @@ impl<R: Real> LightPath<'_, '_, R> {
         if material.is_dark() {
             return light;
         }
+        let hidden = self.seers[object].hidden(ray, sight);
         for (bit, lamp) in world.lights.iter().enumerate() {
             let way = Vec3::of(lamp.position) - sight.place;
             let far = way.length();
             let dir = way * (R::of(1.0) / far);
             let cosine = dir.dot(sight.normal);
-            if cosine.get() <= 0.0 || sight.hidden >> bit & 1 == 1 {
+            if cosine.get() <= 0.0 || hidden >> bit & 1 == 1 {
                 continue;
             }
             let reaching = self.visibility(object, &Ray { origin: sight.place, dir }, far);
@@ -331,8 +345,10 @@ impl<R: Real> LightPath<'_, '_, R> {
         share
     }
 
-    /// Whether an object is met before `far`.
+    /// Whether an object is met before `far`: traced, which stops at any hit and so costs less than a tree's answer.
     fn is_met(&mut self, index: usize, ray: &Ray<R>, far: R) -> bool {
-        self.sight(index, ray, far).is_some()
+        let seer = &self.seers[index];
+        let within = Slabs::new(ray).entry(&seer.bounds, R::of(0.0), far);
+        within.is_some() && seer.is_met(ray, Reach { to: far, ..Reach::whole() })
     }
 }

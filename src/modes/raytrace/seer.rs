@@ -21,21 +21,22 @@ pub struct Sight<R> {
     pub place: Vec3<R>,
     /// The unit normal, on the side of the ray.
     pub normal: Vec3<R>,
-    /// Lights that the object itself hides from there, a bit each.
-    pub hidden: u8,
-    /// How the ray goes on that the object turns.
-    pub turned: Turned<R>,
+    /// What else is known of it.
+    pub known: Known<R>,
 }
 
-/// How a ray goes on.
+/// What is known of a sight beside its place and normal.
 #[derive(Clone, Copy, Debug)]
-pub enum Turned<R> {
-    /// The object turns none, or the ray stays inside.
-    Not,
-    /// Not followed yet.
-    Unknown(Hit<R>),
-    /// It leaves, after so many turns.
-    Known(Ray<R>, u32),
+pub enum Known<R> {
+    /// The hit; shadows and the way on are found when they are asked for.
+    Traced(Hit<R>),
+    /// The tree has told it all.
+    Told {
+        /// Lights that the object itself hides from there, a bit each.
+        hidden: u8,
+        /// How the ray goes on that the object turns, and after how many turns. `None` if it does not.
+        turned: Option<(Ray<R>, u32)>,
+    },
 }
 
 /// The lights of a world before one surface.
@@ -57,7 +58,7 @@ impl Lights for OwnShadow<'_> {
             let faces = (cosine > 0.0) == hit.enters;
             let from = R::of(2.0 * hit.error / cosine.abs().max(f64::MIN_POSITIVE));
             let reach = Reach { from, to: far, ..Reach::whole() };
-            faces && self.surface.hit(&Ray { origin: place, dir }, reach).is_some()
+            faces && self.surface.is_met(&Ray { origin: place, dir }, reach)
         };
         self.lights.iter().enumerate().fold(0, |bits, (i, light)| bits | u8::from(is_hidden(light)) << i)
     }
@@ -117,14 +118,13 @@ impl<'a, R: Real> Seer<'a, R> {
     /// The nearest sight of the object by tracing.
     pub fn trace(&self, ray: &Ray<R>, reach: Reach<R>) -> Option<Sight<R>> {
         let hit = self.object.surface.hit(ray, reach)?;
-        let turned = if self.optics.is_some() { Turned::Unknown(hit) } else { Turned::Not };
         let normal = if hit.enters { hit.normal } else { -hit.normal };
-        Some(Sight { t: hit.t, place: hit.place(ray), normal, hidden: 0, turned }).map(|sight| {
-            if self.own_shadow.lights.is_empty() || self.material().is_dark() {
-                return sight;
-            }
-            Sight { hidden: self.own_shadow.hidden(ray, &hit), ..sight }
-        })
+        Some(Sight { t: hit.t, place: hit.place(ray), normal, known: Known::Traced(hit) })
+    }
+
+    /// Whether the object is met within reach.
+    pub fn is_met(&self, ray: &Ray<R>, reach: Reach<R>) -> bool {
+        self.object.surface.is_met(ray, reach)
     }
 
     /// The same by its tree, for a ray whose origin lies before the object's box. `Err` says why it is to be traced.
@@ -133,20 +133,17 @@ impl<'a, R: Real> Seer<'a, R> {
             None => Err(Reason::Guard),
             Some(Tree::Seen(tree)) => {
                 let lines = tree.attribute().lines();
-                let point = point(lines, ray);
+                let point = lines.point(ray);
                 let seen = answer(tree.query(point, cache))?;
-                Ok(seen.and_then(|seen| sight(lines, ray, point, &seen, |_| Turned::Not)))
+                Ok(seen.and_then(|seen| sight(lines, ray, point, &seen, |_| None)))
             }
             Some(Tree::Through(tree)) => {
                 let exits = tree.attribute();
-                let point = point(exits.lines(), ray);
+                let point = exits.lines().point(ray);
                 let through = answer(tree.query(point, cache))?;
                 Ok(through.and_then(|through| {
-                    let turned = |place| {
-                        exits
-                            .exit_of(&through, ray, place)
-                            .map_or(Turned::Not, |exit| Turned::Known(exit, through.turns()))
-                    };
+                    let turned =
+                        |place| exits.exit_of(&through, ray, place).map(|exit| (exit, through.turns()));
                     sight(exits.lines(), ray, point, &through.seen, turned)
                 }))
             }
@@ -155,13 +152,20 @@ impl<'a, R: Real> Seer<'a, R> {
 
     /// How a ray goes on from a sight. `None` if it does not.
     pub fn turned(&self, ray: &Ray<R>, sight: &Sight<R>) -> Option<(Ray<R>, u32)> {
-        match (sight.turned, self.optics) {
-            (Turned::Known(exit, turns), _) => Some((exit, turns)),
-            (Turned::Unknown(hit), Some(optics)) => {
-                let path = follow(&self.object.surface, ray, hit, optics, self.limit);
+        match sight.known {
+            Known::Told { turned, .. } => turned,
+            Known::Traced(hit) => {
+                let path = follow(&self.object.surface, ray, hit, self.optics?, self.limit);
                 path.exit.map(|exit| (exit, path.turns))
             }
-            _ => None,
+        }
+    }
+
+    /// The lights that the object itself hides from a sight, a bit each.
+    pub fn hidden(&self, ray: &Ray<R>, sight: &Sight<R>) -> u8 {
+        match sight.known {
+            Known::Told { hidden, .. } => hidden,
+            Known::Traced(hit) => self.own_shadow.hidden(ray, &hit),
         }
     }
 
@@ -202,11 +206,6 @@ impl<'a, R: Real> Seer<'a, R> {
     }
 }
 
-fn point<R: Real>(lines: &SurfaceLines, ray: &Ray<R>) -> LinePoint {
-    let pair = lines.space().pair_of(ray.dir);
-    LinePoint { pair, stuv: lines.space().intercepts(ray, pair).map(R::get) }
-}
-
 /// What a tree says: an output, `None` for a line that passes the box by, or why to trace.
 fn answer<T>(answer: Option<Answer<T>>) -> Result<Option<T>, Reason> {
     match answer {
@@ -221,7 +220,7 @@ fn sight<R: Real>(
     ray: &Ray<R>,
     point: LinePoint,
     seen: &Seen,
-    turned: impl FnOnce(Vec3<R>) -> Turned<R>,
+    turned: impl FnOnce(Vec3<R>) -> Option<(Ray<R>, u32)>,
 ) -> Option<Sight<R>> {
     if *seen == Seen::MISS || !is_in_range(&point.stuv) {
         return None;
@@ -230,5 +229,5 @@ fn sight<R: Real>(
     let place = ray.at(t);
     let normal = vector(seen.normal);
     let normal = if seen.enters() { normal } else { -normal };
-    Some(Sight { t, place, normal, hidden: seen.hidden(), turned: turned(place) })
+    Some(Sight { t, place, normal, known: Known::Told { hidden: seen.hidden(), turned: turned(place) } })
 }

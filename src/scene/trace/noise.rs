@@ -33,14 +33,14 @@ impl Noise {
         let cell = p.map(|x| x.get().floor());
         let within: [R; 3] = std::array::from_fn(|a| p[a] - R::of(cell[a]));
         let fade = within.map(|x| x * x * x * (x * (x * R::of(6.0) - R::of(15.0)) + R::of(10.0)));
+        let from = [within, within.map(|x| x - R::of(1.0))];
         let corner = |bits: usize| {
             let off: [usize; 3] = std::array::from_fn(|a| bits >> a & 1);
             let slope = self.slope(std::array::from_fn(|a| cell[a] as i64 + off[a] as i64));
-            (0..3).fold(R::of(0.0), |sum, a| match slope[a] {
-                0 => sum,
-                1 => sum + (within[a] - R::of(off[a] as f64)),
-                _ => sum - (within[a] - R::of(off[a] as f64)),
-            })
+            // Of the three parts of the product one is zero.
+            let part = |a: usize| if slope[a] < 0 { -from[off[a]][a] } else { from[off[a]][a] };
+            let zero = slope.iter().position(|&s| s == 0).unwrap_or(0);
+            part((zero + 1) % 3) + part((zero + 2) % 3)
         };
         let mix = |a: R, b: R, share: R| a + (b - a) * share;
         let edge = |bits: usize| mix(corner(bits), corner(bits | 1), fade[0]);
