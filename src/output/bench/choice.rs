@@ -10,6 +10,10 @@ pub fn files(report: &ChoiceReport) -> Vec<Named> {
     vec![("choice.html".into(), page(report)), ("choice.csv".into(), csv(report))]
 }
 
+/// What times are.
+const FROM_COLD: &str =
+    "all are from the scene as read to the last length of the views, with all trees and tables";
+
 /// The ratio beyond which a choice is called a bad one.
 const BAD: f64 = 1.3;
 
@@ -52,7 +56,7 @@ fn page(report: &ChoiceReport) -> String {
          <tbody>{rows}</tbody></table></div>",
         verdict(report)
     );
-    let lead = machine(&report.machine, &report.command, report.complete);
+    let lead = machine(&report.machine, &report.command, report.complete, FROM_COLD);
     document("What auto chooses", &[("", lead), ("Choices", table)])
 }
 
