@@ -83,12 +83,6 @@ impl<'a> SurfaceLines<'a> {
         Ray { origin, dir }
     }
 
-    /// Where a ray's line lies in line space.
-    pub fn point_of<R: Real>(&self, ray: &Ray<R>) -> LinePoint {
-        let pair = self.space.pair_of(ray.dir);
-        LinePoint { pair, stuv: self.space.intercepts(ray, pair).map(R::get) }
-    }
-
     /// How far along the dominant axis a place lies, box units.
     pub fn depth<R: Real>(&self, place: Vec3<R>, pair: PlanePair) -> R {
         let [k, ..] = pair.axes();

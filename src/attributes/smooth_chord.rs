@@ -149,7 +149,7 @@ mod tests {
             let exact = chord(&surface, &ray).map_or(0.0, |(length, _)| length);
             assert!((exact - expected).abs() < 1e-6, "{exact}, not {expected}");
             hits += usize::from(exact > 0.0);
-            let point = tree.attribute().lines().point_of(&ray);
+            let point = tree.attribute().lines().point(&ray);
             if let Some(Answer::Interpolated(near)) = tree.query(point, &cache) {
                 sum += (near.map_or(0.0, |c| f64::from(c.length)) - exact).abs();
                 interpolated += 1;

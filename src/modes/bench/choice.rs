@@ -250,13 +250,14 @@ mod tests {
         let report = choice(&settings, &Control::none()).expect("a report");
         assert!(report.complete && report.cells.len() == 2 * VIEWS.len() * 2);
         for cell in &report.cells {
-            assert!(cell.seconds.len() >= 2 && cell.ratio >= 1.0 && cell.ratio.is_finite(), "{cell:?}");
+            // Whatever is measured, the best among it is; others may have left.
+            assert!(!cell.seconds.is_empty() && cell.ratio >= 1.0 && cell.ratio.is_finite(), "{cell:?}");
             let best = cell.seconds.iter().map(|s| s.1).fold(f64::INFINITY, f64::min);
             match cell.seconds.iter().find(|(name, _)| *name == cell.chosen) {
                 Some((_, seconds)) => assert_eq!(cell.ratio, seconds / best),
                 None => assert_eq!(cell.ratio, HOPELESS),
             }
-            assert!(cell.leaves > 0);
+            assert!(cell.leaves > 0 || cell.views > VIEWS[0], "a first view grows some: {cell:?}");
         }
         assert!(report.worst_ratio >= report.cells[0].ratio);
     }

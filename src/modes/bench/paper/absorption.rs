@@ -134,7 +134,7 @@ impl<R: Real> Body<'_, R> {
         if !is_met {
             return R::of(0.0);
         }
-        let known = self.tree.as_ref().map(|tree| tree.query(tree.attribute().lines().point_of(ray), cache));
+        let known = self.tree.as_ref().map(|tree| tree.query(tree.attribute().lines().point(ray), cache));
         match known {
             Some(None) => R::of(0.0),
             Some(Some(Answer::Interpolated(known))) => R::of(known.map_or(0.0, |c| c.length.into())),
