@@ -142,21 +142,6 @@ impl LineSpace {
         [o[0] + first * d[0], o[1] + first * d[1], o[0] + second * d[0], o[1] + second * d[1]]
     }
 
-    /// The ray from the front plane through two intercepts; as [`line_of`](Self::line_of) finds it.
-    pub fn ray_of<R: Real>(&self, pair: PlanePair, [s, t, u, v]: [R; 4]) -> Ray<R> {
-        let [k, i, j] = pair.axes();
-        let (front, back) = if pair.reversed { (1.0, 0.0) } else { (0.0, 1.0) };
-        let place = |plane: f64, across: [R; 2]| {
-            let mut p = [R::of(plane); 3];
-            p[i] = across[0];
-            p[j] = across[1];
-            p[k] = R::of(plane);
-            Vec3::of(self.min) + Vec3::new(p[0], p[1], p[2]).scaled(Vec3::of(self.size))
-        };
-        let (start, end) = (place(front, [s, t]), place(back, [u, v]));
-        Ray { origin: start, dir: (end - start).normalized() }
-    }
-
     /// The line through the two intercepts, from the front plane on; its origin lies on the front plane.
     ///
     /// `None` only where a box is so small or so far off that the two planes round to one.

@@ -149,3 +149,38 @@ const OFFSET_SCALE: f64 = 1.5;
 
 /// Slopes are at most 1, and take half the range: what a camera's rays meet changes less with the slope than with the place.
 const SLOPE_SCALE: f64 = 0.75;
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+    use crate::surface::{Reach, Sphere};
+
+    #[test]
+    fn lines_come_back_from_their_points_and_cells_called_empty_hold_none_that_hits() {
+        let surface = Surface::Sphere(Sphere::new(DVec3::new(30.0, -4.0, 7.0), 12.0).expect("a sphere"));
+        let lines = SurfaceLines::new(&surface).expect("an extent");
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(5);
+        let (mut empty, mut hits) = (0, 0);
+        for i in 0..3_000 {
+            let pair = PlanePair::ALL[i % 6];
+            let low: [f64; 4] = std::array::from_fn(|_| rng.random_range(-1.0..1.9));
+            let cell = Cell { low, high: low.map(|x| x + rng.random_range(0.01..0.1)) };
+            let is_empty = lines.is_certainly_empty::<f64>(pair, &cell);
+            for _ in 0..20 {
+                let stuv = std::array::from_fn(|a| rng.random_range(cell.low[a]..cell.high[a]));
+                let ray = lines.ray::<f64>(LinePoint { pair, stuv });
+                let is_hit = surface.hit(&ray, Reach::whole()).is_some();
+                assert!(!(is_empty && is_hit), "{pair:?} {cell:?} {stuv:?}");
+                hits += u32::from(is_hit);
+                // Beyond slopes of 1 another pair's is the line.
+                let back = lines.point(&ray);
+                let is_same = (0..4).all(|a| (back.stuv[a] - stuv[a]).abs() < 1e-12);
+                assert!(back.pair != pair || is_same, "{stuv:?} {back:?}");
+            }
+            empty += u32::from(is_empty);
+        }
+        assert!(empty > 500 && hits > 1_000, "{empty} {hits}");
+    }
+}
