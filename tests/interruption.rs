@@ -111,7 +111,7 @@ fn audits_stopped_write_nothing() {
     let lines = ["audit", "balls.toml", "--rays", "1e10", "-o", "out"];
     let aimed = ["audit", "balls.toml", "--adversarial", "1e9"];
     for args in [&views[..], &lines, &aimed] {
-        stop(args, 200, |folder| assert_nothing_new(folder));
+        stop(args, 200, assert_nothing_new);
     }
 }
 
@@ -119,7 +119,7 @@ fn audits_stopped_write_nothing() {
 fn oracles_sweeps_benchmarks_and_checks_are_stopped_at_once() {
     let (oracles, stress) = (["audit", "adult", "--oracles"], ["audit", "balls.toml", "--stress", "1e9"]);
     for args in [&oracles[..], &stress, &["bench", "curve", "balls.toml"]] {
-        stop(args, 200, |folder| assert_nothing_new(folder));
+        stop(args, 200, assert_nothing_new);
     }
     stop(&["check", "adult", "adult", "adult", "adult", "adult", "adult"], 50, |_| {});
 }

@@ -86,7 +86,7 @@ impl<L: Lights, R: Real> Attribute for ExitRay<'_, L, R> {
     }
 
     /// The distance of the exit rays in line space (§2.3); of rays that do not leave, that of the hits' depths. A plain mirror
-    /// turns the ray itself at the interpolated place: its distance is that of the normals, see [`LEVERAGE`].
+    /// turns the ray itself at the interpolated place: its distance is that of the normals, see `LEVERAGE`.
     fn distance(&self, a: &Through, b: &Through) -> f64 {
         if self.is_plain_mirror(a) && self.is_plain_mirror(b) {
             return distance::<R>(&a.seen, &b.seen, LEVERAGE);

@@ -88,7 +88,7 @@ impl Shear {
 
     /// What a place's products with make its coordinates across, but for where the origin lies.
     #[inline(always)]
-    pub fn to_across(&self) -> [DVec3; 2] {
+    pub fn rows_across(&self) -> [DVec3; 2] {
         let [x, y, z] = self.across;
         [DVec3::new(x[0], y[0], z[0]), DVec3::new(x[1], y[1], z[1])]
     }

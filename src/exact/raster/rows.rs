@@ -94,8 +94,8 @@ impl Rows {
             let crossing = |x: S::f64s, y: S::f64s, slope: S::f64s| {
                 simd.add_f64s(x, simd.mul_f64s(simd.sub_f64s(row, y), slope))
             };
-            let (x, y, slope): (fn(&Edge) -> f64, fn(&Edge) -> f64, fn(&Edge) -> f64) =
-                (|edge| edge.low[0], |edge| edge.low[1], |edge| edge.slope);
+            let [x, y, slope]: [fn(&Edge) -> f64; 3] =
+                [|edge| edge.low[0], |edge| edge.low[1], |edge| edge.slope];
             let (first, first_doubt) =
                 first_right(simd, crossing(of_long(x), of_long(y), of_long(slope)), tolerance);
             let (second, second_doubt) =

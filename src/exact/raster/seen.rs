@@ -100,9 +100,9 @@ impl<'a> Seen<'a> {
             return None;
         }
         let near_a_line = 2.0 * edge_on::NEAR * errors.place;
-        let jobs: Vec<usize> = (0..patches.len()).step_by(PATCHES_PER_JOB).collect();
+        let jobs: Vec<usize> = (0..patches.count()).step_by(PATCHES_PER_JOB).collect();
         let look = |&first: &usize| {
-            let range = first..patches.len().min(first + PATCHES_PER_JOB);
+            let range = first..patches.count().min(first + PATCHES_PER_JOB);
             let sights = Look { patches: &patches, projection: &projection, range, near_a_line };
             crate::dispatch::arch().dispatch(sights)
         };

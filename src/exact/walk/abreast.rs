@@ -63,7 +63,7 @@ impl Default for Ranks {
 impl Frame {
     #[inline(always)]
     fn new(origin: DVec3, dir: DVec3) -> Self {
-        let by = Shear::of(origin, dir).to_across();
+        let by = Shear::of(origin, dir).rows_across();
         Self { by, offset: by.map(|by| -by.dot(origin)) }
     }
 
@@ -95,7 +95,7 @@ impl Ranks {
             let mut left = 0;
             for i in 0..count {
                 let walk = self.walking[i];
-                let (ray, sign) = (walk as usize / 2, if walk % 2 == 0 { -1.0 } else { 1.0 });
+                let (ray, sign) = (walk as usize / 2, if walk.is_multiple_of(2) { -1.0 } else { 1.0 });
                 let at = &mut self.standings[walk as usize];
                 let next = at.step(walker, &self.frames[ray], sign);
                 // There, or at the outline.
