@@ -21,7 +21,7 @@ use crate::scene::{Folder, Scene, SceneText, View};
 pub const VIEWS: [u64; 3] = [1, 8, 64];
 
 /// Whoever took so many times the shortest time up to a number of views does not go on to more.
-const HOPELESS: f64 = 2.0;
+const HOPELESS: f64 = 6.0;
 
 /// What is measured.
 #[derive(Clone, Debug, PartialEq)]

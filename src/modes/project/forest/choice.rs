@@ -76,8 +76,9 @@ const MET: f64 = std::f64::consts::FRAC_PI_4;
 /// them do not know the lines whose chord is shorter than this times r/F over the tolerance, in longest chords.
 const FACETS: f64 = 20.0;
 
-/// A tree is chosen if its estimate, times this, is less than the exact one: organs may have creases, which it does not know of.
-const DOUBT: f64 = 1.1;
+/// A tree is chosen if its estimate, times this, is less than the exact one: organs may have creases, which it does not know of;
+/// and on two threads a tree's tables take more of the time than on one. Measured on two by `bench choice`.
+const DOUBT: f64 = 2.2;
 
 impl Estimate {
     /// For an organ in a study.
