@@ -78,7 +78,7 @@ const FACETS: f64 = 20.0;
 
 /// A tree is chosen if its estimate, times this, is less than the exact one: organs may have creases, which it does not know of;
 /// and on two threads a tree's tables take more of the time than on one. Measured on two by `bench choice`.
-const DOUBT: f64 = 2.2;
+const DOUBT: f64 = 1.9;
 
 impl Estimate {
     /// For an organ in a study.
