@@ -177,6 +177,10 @@ pub struct Cell {
     pub high: [f64; 4],
 }
 
+/// Directions across an axis in which a cell's lines are parted from a body: along the sides and the corners of what they fill.
+pub(crate) const ACROSS: [[f64; 2]; 8] =
+    [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]];
+
 impl Cell {
     /// All lines through the box.
     pub const ROOT: Self = Self { low: [INTERCEPT_RANGE.0; 4], high: [INTERCEPT_RANGE.1; 4] };
@@ -201,16 +205,6 @@ impl Cell {
     /// the cell's two rectangles; eight planes touch it along its sides and its corners. Each is a normal n and a height h, box
     /// units, with n·x ≥ h at all points x of the shaft: where n·x < h at each point of a body, no line meets it.
     pub fn shaft_planes(&self, pair: PlanePair) -> impl Iterator<Item = (DVec3, f64)> {
-        const ACROSS: [[f64; 2]; 8] = [
-            [1.0, 0.0],
-            [-1.0, 0.0],
-            [0.0, 1.0],
-            [0.0, -1.0],
-            [1.0, 1.0],
-            [1.0, -1.0],
-            [-1.0, 1.0],
-            [-1.0, -1.0],
-        ];
         let ([k, i, j], cell) = (pair.axes(), *self);
         ACROSS.into_iter().map(move |[a, b]| {
             // The least value of a·x_i + b·x_j among the cell's lines: `front` on its plane, `back` on the other, linear in

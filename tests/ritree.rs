@@ -164,23 +164,28 @@ fn trees_of_any_tolerance_depth_and_cache_stay_whole_and_keep_their_answers() {
     {
         let parameters = Parameters { distance_threshold, max_depth, ..Parameters::default() };
         let interpolation = Interpolation::Quadrilinear { parameters };
-        let mut first = None;
-        for cache_bytes in [100_000_000, 100_000, 1_000, 0] {
-            let settings = TreeSettings { interpolation, cache_bytes, ..TreeSettings::default() };
-            let projector = projector(&scene, settings);
-            let views = [0, 1].map(|i| bits(&view(&projector, &scene, i)));
-            projector.check_invariants();
-            let expected = first.get_or_insert_with(|| views.clone());
-            assert!(*expected == views, "{distance_threshold}, depth {max_depth}, {cache_bytes} bytes");
-        }
+        let lengths = lengths_whatever_the_cache(&scene, interpolation);
         // Whatever is traced is exact; whatever is interpolated is a length.
-        let settings = TreeSettings { interpolation, ..TreeSettings::default() };
-        let lengths = view(&projector(&scene, settings), &scene, 0).own_length_mm(1);
         assert!(lengths.iter().all(|length| (0.0..=40.5).contains(length)), "{distance_threshold}");
         if max_depth == 0 {
             assert_eq!(lengths, exact, "a root cell holds lines that hit and lines that miss");
         }
     }
+}
+
+/// Lengths in the first view, which trees find alike, and stay whole, under caches of any size.
+fn lengths_whatever_the_cache(scene: &Scene, interpolation: Interpolation) -> Vec<f32> {
+    let mut first = None;
+    for cache_bytes in [100_000_000, 100_000, 1_000, 0] {
+        let settings = TreeSettings { interpolation, cache_bytes, ..TreeSettings::default() };
+        let projector = projector(scene, settings);
+        let views = [0, 1].map(|i| bits(&view(&projector, scene, i)));
+        projector.check_invariants();
+        let expected = first.get_or_insert_with(|| views.clone());
+        assert!(*expected == views, "{interpolation:?}, {cache_bytes} bytes");
+    }
+    let settings = TreeSettings { interpolation, ..TreeSettings::default() };
+    view(&projector(scene, settings), scene, 0).own_length_mm(1).to_vec()
 }
 
 #[test]
@@ -190,17 +195,7 @@ fn trees_of_squared_chords_of_any_tolerance_and_cache_stay_whole_and_keep_their_
     let exact = view(&exact, &scene, 0).own_length_mm(1);
     for tolerance_mm in [0.0, f64::MIN_POSITIVE, 0.3, f64::MAX, f64::INFINITY] {
         let interpolation = Interpolation::SquaredChord { tolerance_mm };
-        let mut first = None;
-        for cache_bytes in [100_000_000, 100_000, 1_000, 0] {
-            let settings = TreeSettings { interpolation, cache_bytes, ..TreeSettings::default() };
-            let projector = projector(&scene, settings);
-            let views = [0, 1].map(|i| bits(&view(&projector, &scene, i)));
-            projector.check_invariants();
-            let expected = first.get_or_insert_with(|| views.clone());
-            assert!(*expected == views, "{tolerance_mm} mm, {cache_bytes} bytes");
-        }
-        let settings = TreeSettings { interpolation, ..TreeSettings::default() };
-        let lengths = view(&projector(&scene, settings), &scene, 0).own_length_mm(1);
+        let lengths = lengths_whatever_the_cache(&scene, interpolation);
         assert!(lengths.iter().all(|length| (0.0..=40.5).contains(length)), "{tolerance_mm} mm: {lengths:?}");
         if tolerance_mm < 1e-9 {
             assert_eq!(lengths, exact, "nothing is known so well");

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::chord::LEAST_SEPARATION;
 use crate::geometry::{Bounds, Ray, Real, Vec3, convex_hull};
-use crate::linespace::{Cell, LinePoint, LineSpace, PlanePair};
+use crate::linespace::{ACROSS, Cell, LinePoint, LineSpace, PlanePair};
 use crate::surface::Surface;
 
 /// A surface with the line space of a cube around it and the points of its hull.
@@ -112,16 +112,6 @@ impl<'a> SurfaceLines<'a> {
     /// Whether no line of the cell meets the surface, proved: all of the hull lies on one side of what the lines reach,
     /// seen along one of eight directions across the axis.
     pub fn is_certainly_empty<R: Real>(&self, pair: PlanePair, cell: &Cell) -> bool {
-        const ACROSS: [[f64; 2]; 8] = [
-            [1.0, 0.0],
-            [-1.0, 0.0],
-            [0.0, 1.0],
-            [0.0, -1.0],
-            [1.0, 1.0],
-            [1.0, -1.0],
-            [-1.0, 1.0],
-            [-1.0, -1.0],
-        ];
         let [k, i, j] = pair.axes();
         let side = self.space.size()[k];
         let unit = |axis: usize, x: f64| (x - 0.5) / if axis < 2 { OFFSET_SCALE } else { SLOPE_SCALE };
