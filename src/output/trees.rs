@@ -1,12 +1,34 @@
 //! Files of trees, kept from one run for a later one.
 
 use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 use super::write_atomically;
 use crate::error::{Error, Result};
-use crate::modes::project::KeepsTrees;
+use crate::modes::project::{KeepsTrees, TREES_BEGIN};
 use crate::ritree::{Loaded, Unreadable};
+
+/// Makes sure that trees may be written to `path`: nothing is there, or older trees. A name given by mistake, the scene's for
+/// example, costs nobody the file of that name.
+///
+/// # Errors
+/// A file that holds something else; one that cannot be read.
+pub fn check_target(path: &Path) -> Result<()> {
+    // What is no file is refused when it is written.
+    if !path.is_file() {
+        return Ok(());
+    }
+    let mut begin = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(TREES_BEGIN.len() as u64).read_to_end(&mut begin))
+        .map_err(|e| Error::io("read", path, e))?;
+    if begin.is_empty() || begin == TREES_BEGIN {
+        return Ok(());
+    }
+    let problem = "is there and holds no trees; it would be lost";
+    Err(Error::input(path.display().to_string(), problem, "give --save-trees a name that is free"))
+}
 
 /// Writes the trees that a run has grown. Returns the file's bytes.
 ///

@@ -29,6 +29,7 @@ pub use rows::Format;
 use super::{AtomicFile, json, write_atomically};
 use crate::error::{Error, Result};
 use crate::modes::dose::{DoseReport, Illustrations, Part, Shard};
+use crate::study::Study;
 
 /// The record's name.
 pub const RECORD: &str = "dose.json";
@@ -53,6 +54,31 @@ pub fn write(folder: &Path, report: &DoseReport, shown: &Illustrations, formats:
     let page = page::page(report, shown)?;
     write_atomically(&folder.join(PAGE), |out| out.write_all(page.as_bytes()))?;
     json::write(&folder.join(RECORD), report)?;
+    Ok(())
+}
+
+/// Makes sure that no table takes the place of a file that the study reads, such as its list of paths, named `paths.csv` too.
+///
+/// # Errors
+/// The first such file.
+pub fn spare_inputs(folder: &Path, study_file: &Path, study: &Study) -> Result<()> {
+    // A folder that is not there yet holds nothing.
+    let Ok(folder) = folder.canonicalize() else { return Ok(()) };
+    let tables = Table::ALL.map(Table::stem).into_iter().chain(figures::STEMS);
+    let names: Vec<String> = tables.map(|stem| format!("{stem}.{}", Format::Csv.ending())).collect();
+    for input in study.inputs() {
+        let path = study_file.with_file_name(&input.file);
+        let Ok(real) = path.canonicalize() else { continue };
+        let is_target = real.parent() == Some(&folder)
+            && real.file_name().is_some_and(|name| names.iter().any(|table| name == table.as_str()));
+        if is_target {
+            return Err(Error::input(
+                path.display().to_string(),
+                "the study reads this file, and a table of that name would take its place",
+                "give another folder with --output",
+            ));
+        }
+    }
     Ok(())
 }
 
