@@ -9,7 +9,8 @@ use common::{folder, study_in};
 
 #[test]
 fn a_list_of_paths_is_not_replaced_by_the_table_of_that_name() {
-    const LIST: &str = "source_x_mm,source_y_mm,source_z_mm,target_x_mm,target_y_mm,target_z_mm\n0,-900,0,1,90,2\n";
+    const LIST: &str =
+        "source_x_mm,source_y_mm,source_z_mm,target_x_mm,target_y_mm,target_z_mm\n0,-900,0,1,90,2\n";
     let study = "scene = \"boxes.toml\"\npaths = { csv = \"paths.csv\" }\n";
     let folder = folder(&[("study.toml", study), ("paths.csv", LIST)]);
     let run = |output: &str| {

@@ -85,7 +85,10 @@ fn what_cannot_be_taken_over_is_refused_in_one_sentence_and_nothing_is_written()
             "without the places of chords",
         ),
         (&["audit", "ball.toml", "--method", "walk", "--save-trees", "x"], "--method walk makes no trees"),
-        (&["project", "ball.toml", "-o", "out", "--save-trees", "ball.toml"], "ball.toml: is there and holds no trees"),
+        (
+            &["project", "ball.toml", "-o", "out", "--save-trees", "ball.toml"],
+            "ball.toml: is there and holds no trees",
+        ),
     ] {
         let run = run(args);
         assert_eq!(run.status.code(), Some(2), "{args:?}");

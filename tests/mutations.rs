@@ -330,8 +330,9 @@ fn fuzz(seed: u64, done: impl Fn(u64) -> bool) -> [u64; 4] {
 #[test]
 fn the_corpus_itself_is_read() {
     for (path, bytes) in corpus() {
-        let is_surface =
-            path.extension().is_some_and(|e| ["obj", "stl", "ply", "points"].contains(&&*e.to_string_lossy()));
+        let is_surface = path
+            .extension()
+            .is_some_and(|e| ["obj", "stl", "ply", "points"].contains(&&*e.to_string_lossy()));
         let expected = if is_surface { Fate::Traced } else { Fate::Read };
         assert_eq!(feed(&path, &bytes, 1), expected, "{}", path.display());
     }

@@ -12,8 +12,22 @@ const PROGRAM: &str = env!("CARGO_BIN_EXE_chordfield");
 
 /// What programs open connections by; `.ci/deny.toml` bans the same.
 const CRATES: [&str; 16] = [
-    "async-io", "async-std", "attohttpc", "curl", "h2", "hyper", "isahc", "mio", "native-tls", "openssl", "quinn", "reqwest",
-    "rustls", "socket2", "tokio", "ureq",
+    "async-io",
+    "async-std",
+    "attohttpc",
+    "curl",
+    "h2",
+    "hyper",
+    "isahc",
+    "mio",
+    "native-tls",
+    "openssl",
+    "quinn",
+    "reqwest",
+    "rustls",
+    "socket2",
+    "tokio",
+    "ureq",
 ];
 
 /// All files below a folder that end so.
@@ -56,7 +70,8 @@ fn no_command_opens_a_socket() {
     write("balls.toml", &nested_balls(16));
     write("study.toml", "scene = \"balls.toml\"\npaths = { points = [{ at_mm = [0, 0, 0] }] }\n");
     let traced = |program: &str, args: &[&str]| {
-        let strace = ["-f", "-qq", "-o", "calls", "-e", "trace=socket,connect,bind,listen,accept,sendto", program];
+        let strace =
+            ["-f", "-qq", "-o", "calls", "-e", "trace=socket,connect,bind,listen,accept,sendto", program];
         let run = Command::new("strace").current_dir(folder.path()).args(strace).args(args).output().ok()?;
         let calls = std::fs::read_to_string(folder.path().join("calls")).unwrap_or_default();
         Some((run.status.code(), calls))

@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::args::{DoseArgs, FormatArg, TableArg};
-use super::project::method;
+use super::method::method;
 use super::{Session, command_line, keep, print};
 use crate::error::{Error, Result};
 use crate::modes::Control;

@@ -313,7 +313,8 @@ mod tests {
 
     #[test]
     fn finding_weights_is_counted() {
-        let (weights, operations) = Counted::count(|| linear_weights(&[0, 1, 2, 4, 8], FRACTIONS.map(Counted::of)));
+        let (weights, operations) =
+            Counted::count(|| linear_weights(&[0, 1, 2, 4, 8], FRACTIONS.map(Counted::of)));
         assert!(weights.is_some());
         // Cholesky's n³/3 + n²/2 + n/6, n²/2 for each of two triangles, products and differences apart, and the weights.
         assert!((100..200).contains(&operations), "{operations}");

@@ -29,6 +29,7 @@ pub use rows::Format;
 use super::{AtomicFile, json, write_atomically};
 use crate::error::{Error, Result};
 use crate::modes::dose::{DoseReport, Illustrations, Part, Shard};
+use crate::scene::regular_file;
 use crate::study::Study;
 
 /// The record's name.
@@ -103,10 +104,10 @@ pub fn write_part(folder: &Path, part: &Part) -> Result<()> {
 /// A record that cannot be read.
 pub fn read_part(folder: &Path) -> Result<Option<Part>> {
     let path = folder.join(SUMS);
-    let file = match std::fs::File::open(&path) {
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        opened => opened.map_err(|e| Error::io("read", &path, e))?,
-    };
+    if !path.exists() {
+        return Ok(None);
+    }
+    let file = regular_file::open(&path, "part's record")?;
     serde_json::from_reader(BufReader::new(file)).map(Some).map_err(|e| {
         Error::input(
             path.display().to_string(),
@@ -150,7 +151,7 @@ pub fn join_tables(folder: &Path, parts: &[PathBuf]) -> Result<Vec<String>> {
         for (index, part) in parts.iter().enumerate() {
             let path = part.join(&name);
             let refused = |e| Error::io("read", &path, e);
-            let mut rows = BufReader::with_capacity(1 << 20, std::fs::File::open(&path).map_err(refused)?);
+            let mut rows = BufReader::with_capacity(1 << 20, regular_file::open(&path, "part's table")?);
             if format == Format::Csv {
                 let mut head = Vec::new();
                 rows.read_until(b'\n', &mut head).map_err(refused)?;
