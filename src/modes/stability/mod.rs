@@ -74,6 +74,9 @@ const BLOCK: u64 = 1024;
 /// Bodies of more faces than this are asked along fewer rays, in proportion: what a ray costs grows with the faces.
 const FACES_AT_FULL_EFFORT: u64 = 500;
 
+/// One ray of so many is an image of its own for the raster; and each that is recomputed.
+const RASTER_SHARE: usize = 4;
+
 /// Of the body's size: rounding that may change a length by more leaves it open.
 const OPEN_SHARE: f64 = 1e-6;
 
@@ -284,8 +287,11 @@ fn trace_block(body: &Body, rays: &[Aimed], recomputed: u64) -> [Figures; ENGINE
             return figures;
         }
         let lengths = match engine {
-            // Each ray is an image of its own: as dear as the rationals, and asked along as many.
-            Engine::Raster => rays.iter().take(exact.len()).map(|ray| length_by_raster(body, ray)).collect(),
+            // Each ray is an image of its own, and dear.
+            Engine::Raster => {
+                let share = exact.len().max(rays.len() / RASTER_SHARE);
+                rays.iter().take(share).map(|ray| length_by_raster(body, ray)).collect()
+            }
             _ => {
                 let mut lengths = vec![0.0; segments.len()];
                 body.trace(engine, 0, &segments, &mut Lengths(&mut lengths));

@@ -23,7 +23,7 @@ fn bodies() -> Vec<(&'static str, Body)> {
         |mesh: TriMesh, size: [f64; 3]| body(mesh.map_vertices(|v| turn() * (v * DVec3::from(size))));
     vec![
         ("box", turned(cube(1.0), [100.0, 60.0, 30.0])),
-        ("prism", turned(prism(64), [40.0, 40.0, 90.0])),
+        ("prism", body(prism(64).map_vertices(|v| v * DVec3::new(40.0, 40.0, 90.0)))),
         ("plate", turned(cube(1.0), [100.0, 100.0, 0.01])),
         ("ellipsoid", ellipsoid(3)),
         ("cut ellipsoid", cut_ellipsoid()),
