@@ -185,7 +185,7 @@ fn named_pipes_are_refused_wherever_a_file_is_read_or_replaced() {
     write("study.toml", "scene = \"balls.toml\"\npaths = { points = [{ at_mm = [0, 0, 0] }] }\n");
     write("list.toml", "scene = \"balls.toml\"\npaths = { csv = \"pipe\" }\n");
     std::fs::create_dir_all(folder.path().join("parts/shard-1-of-2")).expect("a folder");
-    for pipe in ["pipe", "pipe.obj", "parts/shard-1-of-2/sums.json"] {
+    for pipe in ["pipe", "pipe.toml", "pipe.obj", "parts/shard-1-of-2/sums.json"] {
         assert!(Command::new("mkfifo").arg(folder.path().join(pipe)).status().expect("mkfifo").success());
     }
     let commands: [&[&str]; 7] = [
@@ -194,7 +194,7 @@ fn named_pipes_are_refused_wherever_a_file_is_read_or_replaced() {
         &["dose", "study.toml", "--join", "-o", "parts"],
         &["dose", "list.toml"],
         &["dose", "pipe"],
-        &["trace", "pipe"],
+        &["trace", "pipe.toml"],
         &["check", "pipe.obj"],
     ];
     for args in commands {

