@@ -232,9 +232,10 @@ impl<A: Keepable> RiTree<A> {
                     return Err(Unreadable::damaged("a sample is not finite"));
                 }
                 let node = node.filter(|_| cache.reserve(size_of::<Leaf<A::Output>>()));
+                // A look at what was read is none of what growing the tree takes.
+                let verdict = || place.verdict(&self.attribute, &corners, &self.parameters, || ());
                 if loaded.count(node.is_some())
-                    && (place.sample(&self.attribute) != corners
-                        || self.verdict(place, &corners) != Verdict::Final(kind))
+                    && (place.sample(&self.attribute) != corners || verdict() != Verdict::Final(kind))
                 {
                     return Err(Unreadable::damaged("a cell is not what this program makes of it"));
                 }

@@ -174,7 +174,7 @@ impl<T: Clone + Send + Sync> Node<T> {
         T: PartialEq + std::fmt::Debug,
     {
         let sampled = place.sample(&tree.attribute);
-        let verdict = || tree.verdict(place, &sampled);
+        let verdict = || place.verdict(&tree.attribute, &sampled, &tree.parameters, || ());
         if let Some(leaf) = self.leaf() {
             assert!(
                 self.halves().is_none() && self.lock().is_none(),
