@@ -261,8 +261,9 @@ fn solve_by_cholesky<R: Real, const N: usize>(a: [[R; N]; N], b: [R; N]) -> Opti
             let rest = (0..j).fold(a[i][j], |rest, k| rest - l[i][k] * l[j][k]);
             l[i][j] = if i == j { rest.sqrt() } else { rest / l[j][j] };
         }
-        // Written so that the root of a negative number is no pivot.
-        if !(l[i][i].get() > 1e-6) {
+        let pivot = l[i][i].get();
+        // The root of what is negative by rounding is not a number.
+        if pivot.is_nan() || pivot <= 1e-6 {
             return None;
         }
         y[i] = (0..i).fold(b[i], |rest, k| rest - l[i][k] * y[k]) / l[i][i];

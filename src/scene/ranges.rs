@@ -34,7 +34,7 @@ impl Angles {
         if degrees.len() > MAX_VIEWS {
             return Err(too_many(degrees.len() as f64));
         }
-        match degrees.iter().find(|angle| !(angle.abs() <= MAX_DEG)) {
+        match degrees.iter().find(|angle| angle.is_nan() || angle.abs() > MAX_DEG) {
             Some(angle) => Err(format!("{angle} is no angle of up to {MAX_DEG} degrees; give degrees")),
             None => Ok(Self(degrees)),
         }
