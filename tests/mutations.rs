@@ -347,6 +347,9 @@ fn mutations_of_every_kind_of_file_are_read_soundly_or_refused_in_words() {
     );
 }
 
+/// 2026-11-25, beside other work, 2 404 s from the seed 77: 73 769 mutations, of which 65 908 were refused, 4 147 read and 3 714
+/// traced; none crashed.
+///
 /// For `CHORDFIELD_FUZZ_SECONDS`, an hour if that is not said, from the seed `CHORDFIELD_FUZZ_SEED`; tells its counts.
 #[test]
 #[ignore = "an hour, or as long as CHORDFIELD_FUZZ_SECONDS says"]
