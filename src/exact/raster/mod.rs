@@ -29,6 +29,7 @@ mod projection;
 mod round;
 mod rows;
 mod seen;
+mod stretches;
 mod tracer;
 
 use std::borrow::Cow;

@@ -15,6 +15,7 @@ use super::pixels::Pixels;
 use super::projection::Place;
 use super::rows::{Covered, Rows};
 use super::seen::Seen;
+use super::stretches::{self, Stretches};
 use crate::exact::record::{Record, Way};
 use crate::geometry::Region;
 
@@ -33,6 +34,7 @@ pub struct Tracer<'v, 'a> {
     pub block: Block,
     pub aspect: Aspect,
     pub rows: Rows,
+    pub stretches: Stretches,
     /// Patches near a row of blocks, and near a block.
     near: [Vec<u32>; 2],
 }
@@ -57,7 +59,7 @@ impl<R: Record> pulp::WithSimd for Widely<'_, '_, '_, R> {
 pub struct Block {
     /// Of the rays, mm.
     lengths: Vec<f64>,
-    faces: Vec<Face>,
+    pub faces: Vec<Face>,
     /// The first `span_count` are in use.
     spans: Vec<Span>,
     span_count: usize,
@@ -79,19 +81,36 @@ pub struct SeenFace {
 }
 
 /// A face whose spans are listed.
-struct Face {
-    slope: Slope,
+pub struct Face {
+    pub slope: Slope,
     number: u32,
 }
 
 /// The pixels of a row that a face covers, each end reckoned in the block's columns.
 #[derive(Clone, Copy, Default)]
-struct Span {
-    face: u32,
-    row: i32,
-    start: i16,
-    end: i16,
-    is_out: bool,
+pub struct Span {
+    pub face: u32,
+    pub row: i32,
+    pub start: i16,
+    pub end: i16,
+    pub is_out: bool,
+}
+
+impl Block {
+    /// What faces cover.
+    #[inline(always)]
+    pub fn spans(&self) -> &[Span] {
+        &self.spans[..self.span_count]
+    }
+}
+
+/// How the crossings in a block are found.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Way_ {
+    /// Each by itself.
+    Singly,
+    Chords,
+    Stretches,
 }
 
 impl<'v, 'a> Tracer<'v, 'a> {
@@ -106,6 +125,7 @@ impl<'v, 'a> Tracer<'v, 'a> {
             block: Block::default(),
             aspect: Aspect::default(),
             rows: Rows::default(),
+            stretches: Stretches::default(),
             near: Default::default(),
         }
     }
@@ -118,7 +138,12 @@ impl<'v, 'a> Tracer<'v, 'a> {
 
     #[inline(always)]
     fn trace_blocks<S: pulp::Simd, R: Record>(&mut self, simd: S, record: &mut R) {
-        let is_by_chords = self.view.is_convex && self.seen.is_fine && !R::ASKS_FACES;
+        let how = match (self.view.is_convex && !self.seen.source_is_inside && !R::ASKS_FACES, self.seen.is_fine) {
+            (true, true) => Way_::Chords,
+            (true, false) => Way_::Stretches,
+            (false, _) => Way_::Singly,
+        };
+        let block_columns = if how == Way_::Stretches { stretches::BLOCK_COLUMNS } else { BLOCK_COLUMNS };
         let common = self.asked.intersection(&self.seen.bounds);
         for top in common.rows.clone().step_by(BLOCK_ROWS as usize) {
             let rows = top..(top + BLOCK_ROWS).min(common.rows.end);
@@ -128,19 +153,21 @@ impl<'v, 'a> Tracer<'v, 'a> {
                 None,
                 near_rows,
             );
-            for left in common.columns.clone().step_by(BLOCK_COLUMNS as usize) {
-                let columns = left..(left + BLOCK_COLUMNS).min(common.columns.end);
+            for left in common.columns.clone().step_by(block_columns as usize) {
+                let columns = left..(left + block_columns).min(common.columns.end);
                 let block = Pixels { columns, rows: rows.clone() };
                 let [near_rows, near] = &mut self.near;
                 self.seen.list_near(&block, Some(near_rows), near);
                 if near.is_empty() && !self.seen.source_is_inside {
                     continue;
                 }
-                match (is_by_chords, self.seen.projection.is_cone()) {
-                    (true, true) => self.trace_block_of_chords::<true, S, R>(simd, &block, record),
-                    (true, false) => self.trace_block_of_chords::<false, S, R>(simd, &block, record),
-                    (false, true) => self.trace_block::<true, S>(simd, &block, record),
-                    (false, false) => self.trace_block::<false, S>(simd, &block, record),
+                match (how, self.seen.projection.is_cone()) {
+                    (Way_::Chords, true) => self.trace_block_of_chords::<true, S, R>(simd, &block, record),
+                    (Way_::Chords, false) => self.trace_block_of_chords::<false, S, R>(simd, &block, record),
+                    (Way_::Stretches, true) => self.trace_block_of_stretches::<true, S, R>(simd, &block, record),
+                    (Way_::Stretches, false) => self.trace_block_of_stretches::<false, S, R>(simd, &block, record),
+                    (Way_::Singly, true) => self.trace_block::<true, S>(simd, &block, record),
+                    (Way_::Singly, false) => self.trace_block::<false, S>(simd, &block, record),
                 }
             }
         }
@@ -153,8 +180,6 @@ impl<'v, 'a> Tracer<'v, 'a> {
         block: &Pixels,
         record: &mut impl Record,
     ) {
-        self.block.faces.clear();
-        self.block.span_count = 0;
         self.cover::<CONE, S>(simd, block);
         if self.block.span_count > 0 {
             self.measure_rays(block);
@@ -167,7 +192,7 @@ impl<'v, 'a> Tracer<'v, 'a> {
             self.start_inside(block, record);
         }
         let mut t_mm = [0.0; RUN];
-        for span in &self.block.spans[..self.block.span_count] {
+        for span in self.block.spans() {
             if self.block.edge_on.is_empty() {
                 self.report::<CONE>(span, block, &mut t_mm, record);
             } else {
@@ -219,8 +244,10 @@ impl<'v, 'a> Tracer<'v, 'a> {
 
     /// Lists the faces and what they cover.
     #[inline(always)]
-    fn cover<const CONE: bool, S: pulp::Simd>(&mut self, simd: S, block: &Pixels) {
-        self.each_face::<CONE>(block, |tracer, face| tracer.cover_by(simd, face, block));
+    pub fn cover<const CONE: bool, S: pulp::Simd>(&mut self, simd: S, block: &Pixels) {
+        self.block.faces.clear();
+        self.block.span_count = 0;
+        self.each_face::<CONE>(block, #[inline(always)] |tracer, face| tracer.cover_by(simd, face, block));
     }
 
     #[inline(always)]
