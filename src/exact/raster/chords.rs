@@ -98,7 +98,11 @@ impl Tracer<'_, '_> {
         record: &mut R,
     ) {
         self.block.depths.begin(block);
-        self.each_face::<CONE>(block, |tracer, face| tracer.mark(simd, face, block));
+        self.each_face::<CONE, true>(
+            block,
+            #[inline(always)]
+            |tracer, face| tracer.mark(simd, face, block),
+        );
         if !self.block.edge_on.is_empty() {
             edge_on::sort(&mut self.block.edge_on);
             for e in &self.block.edge_on {

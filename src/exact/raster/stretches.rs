@@ -18,39 +18,35 @@ use super::chords::measure;
 use super::edge_on::{self, EdgeOn};
 use super::face::Slope;
 use super::pixels::Pixels;
-use super::rows::{LANES, first_lanes};
-use super::tracer::{BLOCK_ROWS, Face, Span, Tracer};
+use super::rows::{Covered, LANES, first_lanes};
+use super::tracer::{Face, SeenFace, Tracer};
 use crate::exact::record::{Passes, Record};
 use crate::geometry::{RayGrid, Upstream};
 
 /// Columns of a block: as large faces reach over many, more than where lists are long.
-pub const BLOCK_COLUMNS: i32 = 256;
+pub const BLOCK_COLUMNS: i32 = 512;
 
 const COLUMNS: usize = BLOCK_COLUMNS as usize;
-
-const ROWS: usize = BLOCK_ROWS as usize;
 
 /// A bit for each column at which a span may start or end.
 const WORDS: usize = COLUMNS / 64 + 1;
 
 type Bits = [u64; WORDS];
 
-/// The spans of a block, by row and way, and what is found of a row.
+/// What faces cover of a block, by row and way, and what is found of a row.
 pub struct Stretches {
     rows: Vec<Row>,
-    /// For each column at which a span starts, its face: of a row's entries, then of its exits.
+    /// For each column at which a span starts, its face: of a row's entries, then of its exits. One more, for spans of no pixels.
     faces: Vec<u32>,
+    /// Columns of the block.
+    pitch: usize,
     /// Lengths, entries and exits, mm.
     found: [[f64; COLUMNS + LANES]; 3],
 }
 
 impl Default for Stretches {
     fn default() -> Self {
-        Self {
-            rows: vec![Row::default(); ROWS],
-            faces: vec![0; 2 * ROWS * COLUMNS],
-            found: [[0.0; COLUMNS + LANES]; 3],
-        }
+        Self { rows: Vec::new(), faces: Vec::new(), pitch: 0, found: [[0.0; COLUMNS + LANES]; 3] }
     }
 }
 
@@ -75,12 +71,14 @@ enum Cover {
 }
 
 impl Row {
+    /// Adds a span, if it has any pixels.
     #[inline(always)]
     fn add(&mut self, way: usize, start: usize, end: usize) {
+        let bit = |column: usize| u64::from(start < end) << (column % 64);
         for (bits, column) in [(&mut self.starts[way], start), (&mut self.ends[way], end)] {
-            let (word, bit) = (&mut bits[column / 64 % WORDS], 1 << (column % 64));
-            self.is_double |= *word & bit != 0;
-            *word |= bit;
+            let word = &mut bits[column / 64 % WORDS];
+            self.is_double |= *word & bit(column) != 0;
+            *word |= bit(column);
         }
     }
 
@@ -119,18 +117,26 @@ fn columns_of(bits: Bits) -> impl Iterator<Item = usize> {
 }
 
 impl Stretches {
-    /// Sorts the spans of a block by row and way. Whether any row is folded.
+    /// Begins a block.
+    fn begin(&mut self, block: &Pixels) {
+        self.rows.clear();
+        self.rows.resize(block.rows.len(), Row::default());
+        self.pitch = block.columns.len();
+        let needed = 2 * self.rows.len() * self.pitch + 1;
+        self.faces.resize(needed.max(self.faces.len()), 0);
+    }
+
+    /// Adds the pixels of a row that a face covers, counted from the block's first.
     #[inline(always)]
-    fn sort(&mut self, spans: &[Span], block: &Pixels) -> bool {
-        let rows = &mut self.rows[..block.rows.len()];
-        rows.fill(Row::default());
-        for span in spans {
-            let (row, way) = ((span.row - block.rows.start) as usize % ROWS, usize::from(span.is_out));
-            let start = span.start as usize % COLUMNS;
-            self.faces[(2 * row + way) * COLUMNS + start] = span.face;
-            rows[row].add(way, start, span.end as usize);
-        }
-        rows.iter_mut().fold(false, |is_folded, row| is_folded | matches!(row.cover(), Cover::Folded))
+    fn add(&mut self, face: u32, row: usize, way: usize, [start, end]: [usize; 2]) {
+        self.rows[row].add(way, start, end);
+        let at = (2 * row + way) * self.pitch + start;
+        let none = self.faces.len() - 1;
+        self.faces[if start < end { at } else { none }] = face;
+    }
+
+    fn is_folded(&self) -> bool {
+        self.rows.iter().fold(false, |is_folded, row| is_folded | matches!(row.cover(), Cover::Folded))
     }
 }
 
@@ -143,9 +149,16 @@ impl Tracer<'_, '_> {
         block: &Pixels,
         record: &mut R,
     ) {
-        self.cover::<CONE, S>(simd, block);
-        let is_folded = self.stretches.sort(self.block.spans(), block);
-        if is_folded {
+        self.stretches.begin(block);
+        self.block.faces.clear();
+        self.each_face::<CONE, false>(
+            block,
+            #[inline(always)]
+            |tracer, face| tracer.cover_stretches(simd, face, block),
+        );
+        if self.stretches.is_folded() {
+            // Once more, as lists.
+            self.cover::<CONE, S>(simd, block);
             self.list_covered_twice(block);
         }
         if !self.block.edge_on.is_empty() {
@@ -170,6 +183,26 @@ impl Tracer<'_, '_> {
         }
     }
 
+    /// Notes what a face covers.
+    #[inline(always)]
+    fn cover_stretches<S: Simd>(&mut self, simd: S, face: &SeenFace, block: &Pixels) {
+        let slope = self.slope_of(face, block);
+        let pixels = self.aspect.pixels(face.face).intersection(block);
+        let corners = [0, 1, 2].map(|corner| self.aspect.corner(face.face, corner));
+        let is_even = self.rows.find(simd, &corners, &pixels, self.seen.crossing_error);
+        let is_right_out = is_even != self.seen.projection.is_mirrored();
+        let slot = self.block.faces.len() as u32;
+        let first = (pixels.rows.start - block.rows.start) as usize;
+        for i in 0..pixels.rows.len() {
+            let Covered { start, count, is_long_left } = self.rows.covered(i);
+            let way = usize::from(is_long_left == is_right_out);
+            let start = start - block.columns.start;
+            let columns = [start, start + count.max(0)].map(|column| column as usize);
+            self.stretches.add(slot, first + i, way, columns);
+        }
+        self.block.faces.push(Face { slope, number: face.number });
+    }
+
     /// Finds the lengths of a row that is covered once, between these columns of the block.
     #[inline(always)]
     fn measure_stretches<const CONE: bool, S: Simd, R: Record>(
@@ -179,7 +212,7 @@ impl Tracer<'_, '_> {
         i: usize,
         [first, last]: [usize; 2],
     ) {
-        let Stretches { rows, faces, found } = &mut self.stretches;
+        let Stretches { rows, faces, pitch, found } = &mut self.stretches;
         let row = block.rows.start + i as i32;
         let mut found = Found::<CONE, R> {
             rays: RowOfRays::new(&self.view.grid, row),
@@ -188,7 +221,7 @@ impl Tracer<'_, '_> {
             asks: PhantomData,
         };
         let [ins, outs] = &rows[i].starts;
-        let (of_ins, of_outs) = faces[2 * i * COLUMNS..2 * (i + 1) * COLUMNS].split_at(COLUMNS);
+        let (of_ins, of_outs) = faces[2 * i * *pitch..2 * (i + 1) * *pitch].split_at(*pitch);
         let faces_seen = &self.block.faces;
         // At the first column both change.
         let ([mut face_in, mut face_out], mut from) = ([of_ins[first], of_outs[first]], first);
@@ -205,7 +238,10 @@ impl Tracer<'_, '_> {
                 let entry = Depths::new(&faces_seen[face_in as usize], row);
                 let exit = Depths::new(&faces_seen[face_out as usize], row);
                 found.measure(simd, &entry, &exit, [from, to]);
-                from = to % COLUMNS;
+                if to == last {
+                    return;
+                }
+                from = to;
                 face_in = if ins[word] >> bit & 1 != 0 { of_ins[from] } else { face_in };
                 face_out = if outs[word] >> bit & 1 != 0 { of_outs[from] } else { face_out };
             }

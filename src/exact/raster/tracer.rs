@@ -83,7 +83,7 @@ pub struct SeenFace {
 /// A face whose spans are listed.
 pub struct Face {
     pub slope: Slope,
-    number: u32,
+    pub number: u32,
 }
 
 /// The pixels of a row that a face covers, each end reckoned in the block's columns.
@@ -203,8 +203,9 @@ impl<'v, 'a> Tracer<'v, 'a> {
 
     /// Goes through the faces that may cover pixels of the block, and begins the list of rays to be traced by themselves with
     /// those that lie in the faces of patches on a line of pixels.
+    /// Their edges are found if asked for.
     #[inline(always)]
-    pub fn each_face<const CONE: bool>(
+    pub fn each_face<const CONE: bool, const EDGES: bool>(
         &mut self,
         block: &Pixels,
         mut each: impl FnMut(&mut Self, &SeenFace),
@@ -221,7 +222,7 @@ impl<'v, 'a> Tracer<'v, 'a> {
             if is_known {
                 self.look_along(&patch, block);
             }
-            self.aspect.look_at_faces(&patch, block, seen.care, limits);
+            self.aspect.look_at_faces::<EDGES>(&patch, block, seen.care, limits);
             for i in 0..self.aspect.near_count() {
                 let face = self.aspect.near(i);
                 each(self, &SeenFace { face, number: patch.numbers[face], limits, is_known });
@@ -247,7 +248,11 @@ impl<'v, 'a> Tracer<'v, 'a> {
     pub fn cover<const CONE: bool, S: pulp::Simd>(&mut self, simd: S, block: &Pixels) {
         self.block.faces.clear();
         self.block.span_count = 0;
-        self.each_face::<CONE>(block, #[inline(always)] |tracer, face| tracer.cover_by(simd, face, block));
+        self.each_face::<CONE, false>(
+            block,
+            #[inline(always)]
+            |tracer, face| tracer.cover_by(simd, face, block),
+        );
     }
 
     #[inline(always)]
