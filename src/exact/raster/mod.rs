@@ -38,7 +38,7 @@ pub use patches::Patches;
 use pixels::Pixels;
 use projection::{Projection, Sight};
 use seen::Seen;
-use tracer::Tracer;
+use tracer::{Tracer, Workspaces};
 
 use super::bvh;
 use super::record::Record;
@@ -56,6 +56,7 @@ pub struct RasterView<'a> {
     grid: RayGrid,
     form: Form<'a>,
     is_convex: bool,
+    workspaces: Workspaces,
 }
 
 #[derive(Clone, Debug)]
@@ -75,13 +76,13 @@ impl<'a> RasterView<'a> {
     /// Makes `surface` ready for `grid`.
     pub fn new(surface: &'a ClosedMesh, grid: &RayGrid) -> Self {
         let form = Form::new(surface, grid, || Cow::Owned(Patches::new(surface)));
-        Self { surface, grid: *grid, form, is_convex: false }
+        Self { surface, grid: *grid, form, is_convex: false, workspaces: Workspaces::default() }
     }
 
     /// As [`new`](Self::new), with the surface's patches at hand.
     pub fn of_patches(surface: &'a ClosedMesh, patches: &'a Patches, grid: &RayGrid) -> Self {
         let form = Form::new(surface, grid, || Cow::Borrowed(patches));
-        Self { surface, grid: *grid, form, is_convex: false }
+        Self { surface, grid: *grid, form, is_convex: false, workspaces: Workspaces::default() }
     }
 
     /// The same for a surface that is convex but for rounding: its rays go in and out once, which is quicker

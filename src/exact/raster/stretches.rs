@@ -40,13 +40,15 @@ pub struct Stretches {
     faces: Vec<u32>,
     /// Columns of the block.
     pitch: usize,
+    /// Whether two spans of one row and way start, or end, at the same column.
+    is_double: bool,
     /// Lengths, entries and exits, mm.
     found: [[f64; COLUMNS + LANES]; 3],
 }
 
 impl Default for Stretches {
     fn default() -> Self {
-        Self { rows: Vec::new(), faces: Vec::new(), pitch: 0, found: [[0.0; COLUMNS + LANES]; 3] }
+        Self { rows: Vec::new(), faces: Vec::new(), pitch: 0, is_double: false, found: [[0.0; COLUMNS + LANES]; 3] }
     }
 }
 
@@ -56,50 +58,40 @@ struct Row {
     /// Where spans start and where they end, of entries and of exits.
     starts: [Bits; 2],
     ends: [Bits; 2],
-    /// Whether two spans of one way start, or end, at the same column.
-    is_double: bool,
-}
-
-/// How the spans of a row lie.
-enum Cover {
-    /// There are none.
-    Nothing,
-    /// One after the other, entries and exits as far, from the first of these columns to before the second.
-    Once([usize; 2]),
-    /// Otherwise.
-    Folded,
 }
 
 impl Row {
-    /// Adds a span, if it has any pixels.
+    /// Adds a span, if it has any pixels. Whether another starts, or ends, at the same column, in bits.
     #[inline(always)]
-    fn add(&mut self, way: usize, start: usize, end: usize) {
-        let bit = |column: usize| u64::from(start < end) << (column % 64);
-        for (bits, column) in [(&mut self.starts[way], start), (&mut self.ends[way], end)] {
-            let word = &mut bits[column / 64 % WORDS];
-            self.is_double |= *word & bit(column) != 0;
-            *word |= bit(column);
-        }
+    fn add(&mut self, way: usize, start: usize, end: usize) -> u64 {
+        let any = u64::from(start < end);
+        let (starts, first) = (&mut self.starts[way][start / 64 % WORDS], any << (start % 64));
+        let is_double = *starts & first;
+        *starts |= first;
+        let (ends, last) = (&mut self.ends[way][end / 64 % WORDS], any << (end % 64));
+        let is_double = is_double | *ends & last;
+        *ends |= last;
+        is_double
     }
 
-    /// A column is covered as often as more spans have started than ended: once from the first to the last if all
-    /// columns but these two see one start as one ends, or neither.
+    /// The columns from the first that is covered to before the last, if all of them are covered once by an entry and once
+    /// by an exit, and no others. That is so only if no two spans of one way start or end together: a column is then covered
+    /// as often as more of them have started than ended, and that changes at those two alone.
     #[inline(always)]
-    fn cover(&self) -> Cover {
+    fn covered_once(&self) -> Option<[usize; 2]> {
         let (mut changes, mut count, mut differ) = ([0; WORDS], 0, 0);
         for word in 0..WORDS {
-            let [of_entries, of_exits] = [0, 1].map(|way| self.starts[way][word] ^ self.ends[way][word]);
+            let of_entries = self.starts[0][word] ^ self.ends[0][word];
+            let of_exits = self.starts[1][word] ^ self.ends[1][word];
             changes[word] = of_entries;
             count += of_entries.count_ones();
             differ |= of_entries ^ of_exits;
         }
-        match count {
-            0 if differ == 0 => Cover::Nothing,
-            2 if differ == 0 && !self.is_double => {
-                let mut columns = columns_of(changes);
-                Cover::Once([0; 2].map(|_| columns.next().unwrap_or_default()))
-            }
-            _ => Cover::Folded,
+        let mut columns = columns_of(changes);
+        match (count, differ, columns.next(), columns.next()) {
+            (0, 0, ..) => Some([0; 2]),
+            (2, 0, Some(first), Some(last)) => Some([first, last]),
+            _ => None,
         }
     }
 }
@@ -122,21 +114,24 @@ impl Stretches {
         self.rows.clear();
         self.rows.resize(block.rows.len(), Row::default());
         self.pitch = block.columns.len();
+        self.is_double = false;
         let needed = 2 * self.rows.len() * self.pitch + 1;
         self.faces.resize(needed.max(self.faces.len()), 0);
     }
 
-    /// Adds the pixels of a row that a face covers, counted from the block's first.
+    /// Adds the pixels of a row that a face covers, counted from the block's first. What it returns is as for a row.
     #[inline(always)]
-    fn add(&mut self, face: u32, row: usize, way: usize, [start, end]: [usize; 2]) {
-        self.rows[row].add(way, start, end);
+    fn add(&mut self, face: u32, row: usize, way: usize, [start, end]: [usize; 2]) -> u64 {
+        let is_double = self.rows[row].add(way, start, end);
         let at = (2 * row + way) * self.pitch + start;
         let none = self.faces.len() - 1;
         self.faces[if start < end { at } else { none }] = face;
+        is_double
     }
 
+    /// Whether any row is not covered once.
     fn is_folded(&self) -> bool {
-        self.rows.iter().fold(false, |is_folded, row| is_folded | matches!(row.cover(), Cover::Folded))
+        self.is_double || self.rows.iter().any(|row| row.covered_once().is_none())
     }
 }
 
@@ -149,35 +144,36 @@ impl Tracer<'_, '_> {
         block: &Pixels,
         record: &mut R,
     ) {
-        self.stretches.begin(block);
-        self.block.faces.clear();
+        self.work.stretches.begin(block);
+        self.work.block.faces.clear();
         self.each_face::<CONE, false>(
             block,
             #[inline(always)]
             |tracer, face| tracer.cover_stretches(simd, face, block),
         );
-        if self.stretches.is_folded() {
+        let is_folded = self.work.stretches.is_folded();
+        if is_folded {
             // Once more, as lists.
             self.cover::<CONE, S>(simd, block);
             self.list_covered_twice(block);
         }
-        if !self.block.edge_on.is_empty() {
-            edge_on::sort(&mut self.block.edge_on);
+        if !self.work.block.edge_on.is_empty() {
+            edge_on::sort(&mut self.work.block.edge_on);
             self.trace_edge_on(record);
         }
         for (i, row) in block.rows.clone().enumerate() {
-            let [first, last] = match self.stretches.rows[i].cover() {
-                Cover::Nothing => continue,
-                Cover::Once(columns) => {
+            let [first, last] = match self.work.stretches.rows[i].covered_once().filter(|_| !is_folded) {
+                Some([first, last]) if first == last => continue,
+                Some(columns) => {
                     self.measure_stretches::<CONE, S, R>(simd, block, i, columns);
                     columns
                 }
-                Cover::Folded => self.measure_one_by_one::<CONE>(block, row),
+                None => self.measure_one_by_one::<CONE>(block, row),
             };
-            if !self.block.edge_on.is_empty() {
+            if !self.work.block.edge_on.is_empty() {
                 self.forget_edge_on(block, row);
             }
-            let [lengths_mm, entries, exits] = self.stretches.found.each_ref().map(|of| &of[first..last]);
+            let [lengths_mm, entries, exits] = self.work.stretches.found.each_ref().map(|of| &of[first..last]);
             let ends_mm = if R::ASKS_ENDS { [entries, exits] } else { [&[][..]; 2] };
             record.passes(self.ray(row, block.columns.start + first as i32), &Passes { lengths_mm, ends_mm });
         }
@@ -187,20 +183,22 @@ impl Tracer<'_, '_> {
     #[inline(always)]
     fn cover_stretches<S: Simd>(&mut self, simd: S, face: &SeenFace, block: &Pixels) {
         let slope = self.slope_of(face, block);
-        let pixels = self.aspect.pixels(face.face).intersection(block);
-        let corners = [0, 1, 2].map(|corner| self.aspect.corner(face.face, corner));
-        let is_even = self.rows.find(simd, &corners, &pixels, self.seen.crossing_error);
+        let pixels = self.work.aspect.pixels(face.face).intersection(block);
+        let corners = [0, 1, 2].map(|corner| self.work.aspect.corner(face.face, corner));
+        let is_even = self.work.rows.find(simd, &corners, &pixels, self.seen.crossing_error);
         let is_right_out = is_even != self.seen.projection.is_mirrored();
-        let slot = self.block.faces.len() as u32;
+        let slot = self.work.block.faces.len() as u32;
         let first = (pixels.rows.start - block.rows.start) as usize;
+        let mut is_double = 0;
         for i in 0..pixels.rows.len() {
-            let Covered { start, count, is_long_left } = self.rows.covered(i);
+            let Covered { start, count, is_long_left } = self.work.rows.covered(i);
             let way = usize::from(is_long_left == is_right_out);
             let start = start - block.columns.start;
             let columns = [start, start + count.max(0)].map(|column| column as usize);
-            self.stretches.add(slot, first + i, way, columns);
+            is_double |= self.work.stretches.add(slot, first + i, way, columns);
         }
-        self.block.faces.push(Face { slope, number: face.number });
+        self.work.stretches.is_double |= is_double != 0;
+        self.work.block.faces.push(Face { slope, number: face.number });
     }
 
     /// Finds the lengths of a row that is covered once, between these columns of the block.
@@ -212,7 +210,7 @@ impl Tracer<'_, '_> {
         i: usize,
         [first, last]: [usize; 2],
     ) {
-        let Stretches { rows, faces, pitch, found } = &mut self.stretches;
+        let Stretches { rows, faces, pitch, found, .. } = &mut self.work.stretches;
         let row = block.rows.start + i as i32;
         let mut found = Found::<CONE, R> {
             rays: RowOfRays::new(&self.view.grid, row),
@@ -222,7 +220,7 @@ impl Tracer<'_, '_> {
         };
         let [ins, outs] = &rows[i].starts;
         let (of_ins, of_outs) = faces[2 * i * *pitch..2 * (i + 1) * *pitch].split_at(*pitch);
-        let faces_seen = &self.block.faces;
+        let faces_seen = &self.work.block.faces;
         // At the first column both change.
         let ([mut face_in, mut face_out], mut from) = ([of_ins[first], of_outs[first]], first);
         for word in first / 64..WORDS {
@@ -251,7 +249,7 @@ impl Tracer<'_, '_> {
     /// The faces of a row's pixels, column by column: those of entries and those of exits.
     fn faces_one_by_one(&self, block: &Pixels, row: i32) -> Vec<[Vec<u32>; 2]> {
         let mut faces = vec![[vec![], vec![]]; block.columns.len()];
-        for span in self.block.spans().iter().filter(|span| span.row == row) {
+        for span in self.work.block.spans().iter().filter(|span| span.row == row) {
             for of_pixel in &mut faces[span.start as usize..span.end as usize] {
                 of_pixel[usize::from(span.is_out)].push(span.face);
             }
@@ -259,17 +257,15 @@ impl Tracer<'_, '_> {
         faces
     }
 
-    /// Lists the pixels of folded rows that are covered twice in one way.
+    /// Lists the pixels that are covered twice in one way.
     #[cold]
     #[inline(never)]
     fn list_covered_twice(&mut self, block: &Pixels) {
-        for (i, row) in block.rows.clone().enumerate() {
-            if !matches!(self.stretches.rows[i].cover(), Cover::Folded) {
-                continue;
-            }
+        for row in block.rows.clone() {
             let faces = self.faces_one_by_one(block, row);
-            let twice = block.columns.clone().zip(&faces).filter(|(_, [ins, outs])| ins.len().max(outs.len()) > 1);
-            self.block.edge_on.extend(twice.map(|(column, _)| EdgeOn { row, column, face: 0 }));
+            let is_twice = |(_, [ins, outs]): &(i32, &[Vec<u32>; 2])| ins.len().max(outs.len()) > 1;
+            let twice = block.columns.clone().zip(&faces).filter(is_twice);
+            self.work.block.edge_on.extend(twice.map(|(column, _)| EdgeOn { row, column, face: 0 }));
         }
     }
 
@@ -282,7 +278,7 @@ impl Tracer<'_, '_> {
         for (i, faces) in self.faces_one_by_one(block, row).iter().enumerate() {
             let column = f64::from(block.columns.start + i as i32);
             let depth = |face: u32| {
-                let slope = &self.block.faces[face as usize].slope;
+                let slope = &self.work.block.faces[face as usize].slope;
                 slope.depth(slope.row(row), column)
             };
             let found = match (&faces[0][..], &faces[1][..]) {
@@ -296,7 +292,7 @@ impl Tracer<'_, '_> {
                 }
                 _ => [0.0; 3],
             };
-            self.stretches.found.iter_mut().zip(found).for_each(|(of, value)| of[i] = value);
+            self.work.stretches.found.iter_mut().zip(found).for_each(|(of, value)| of[i] = value);
         }
         [0, block.columns.len()]
     }
@@ -305,8 +301,8 @@ impl Tracer<'_, '_> {
     #[cold]
     #[inline(never)]
     fn forget_edge_on(&mut self, block: &Pixels, row: i32) {
-        let found = &mut self.stretches.found;
-        for e in self.block.edge_on.iter().filter(|e| e.row == row) {
+        let found = &mut self.work.stretches.found;
+        for e in self.work.block.edge_on.iter().filter(|e| e.row == row) {
             found.iter_mut().for_each(|of| of[(e.column - block.columns.start) as usize] = 0.0);
         }
     }
