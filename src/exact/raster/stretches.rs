@@ -96,6 +96,13 @@ impl Row {
     }
 }
 
+/// The first if `is_first` is 1, the second if it is 0.
+#[inline(always)]
+fn either(is_first: u64, first: u32, second: u32) -> u32 {
+    let mask = (is_first as u32).wrapping_neg();
+    first & mask | second & !mask
+}
+
 /// The columns whose bits are set.
 #[inline(always)]
 fn columns_of(bits: Bits) -> impl Iterator<Item = usize> {
@@ -240,8 +247,9 @@ impl Tracer<'_, '_> {
                     return;
                 }
                 from = to;
-                face_in = if ins[word] >> bit & 1 != 0 { of_ins[from] } else { face_in };
-                face_out = if outs[word] >> bit & 1 != 0 { of_outs[from] } else { face_out };
+                // By bits: no branch could foresee which of the two changes.
+                face_in = either(ins[word] >> bit & 1, of_ins[from], face_in);
+                face_out = either(outs[word] >> bit & 1, of_outs[from], face_out);
             }
         }
     }
