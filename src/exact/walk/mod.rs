@@ -275,6 +275,7 @@ impl Walker {
 }
 
 /// A line as the walk sees it.
+#[derive(Clone, Copy, Default)]
 struct LineView {
     shear: Shear,
     origin: DVec3,
@@ -311,7 +312,7 @@ impl LineView {
 }
 
 /// A face walked on, from one of its edges.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Standing {
     /// 4 · face + the edge that the corners and sides are counted from.
     half_edge: u32,

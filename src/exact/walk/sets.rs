@@ -68,12 +68,12 @@ impl Walker {
                     of_lines[j] = seeds[j].unwrap_or_else(|| self.seeds.near(origin, dir).unwrap_or(FIRST));
                     lines[j] = Some((origin, dir));
                 }
-                ranks.walk(self, &lines[..rows.len()], &mut of_lines[..rows.len()]);
+                ranks.walk(self, &lines[..rows.len()], &of_lines[..rows.len()]);
                 for (j, row) in rows.clone().enumerate() {
-                    let Some((origin, dir)) = lines[j] else { continue };
+                    let Some((_, dir)) = lines[j] else { continue };
                     let ray = (row - region.rows.start) as usize * region.columns.len()
                         + (column - region.columns.start) as usize;
-                    let answer = self.pass_from(origin, dir, &mut of_lines[j]);
+                    let answer = ranks.pass(self, j, &mut of_lines[j]);
                     (seeds[j], has_missed[j]) = (Some(of_lines[j]), answer == Ok(None));
                     match answer {
                         Ok(Some(pass)) => note(record, ray, &pass, UNIT, dir.length()),
@@ -153,13 +153,10 @@ impl Walker {
                 }
             }
             self.touch(&lines[..rays.len()], &seeds);
-            if self.faces.len() >= MANY_FACES {
-                ranks.walk(self, &lines[..rays.len()], &mut seeds[..rays.len()]);
-            }
-            for (j, ((seeds, line), ray)) in seeds.iter_mut().zip(lines).zip(rays).enumerate() {
-                let Some((origin, dir)) = line else { continue };
+            ranks.walk(self, &lines[..rays.len()], &seeds[..rays.len()]);
+            for (j, (seeds, ray)) in seeds.iter_mut().zip(rays).enumerate().filter(|(j, _)| lines[*j].is_some()) {
                 let number = first + i * ABREAST + j;
-                match self.pass_from(origin, dir, seeds) {
+                match ranks.pass(self, j, seeds) {
                     Ok(Some(pass)) => note(record, number, &pass, ray.reach(), 1.0),
                     Ok(None) => {}
                     Err(Unsure) => other(number, ray, record),
