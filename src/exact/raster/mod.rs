@@ -26,7 +26,6 @@ mod near;
 mod patches;
 mod pixels;
 mod projection;
-mod round;
 mod rows;
 mod seen;
 mod stretches;
@@ -42,6 +41,7 @@ use tracer::{Tracer, Workspaces};
 
 use super::bvh;
 use super::record::Record;
+use super::round;
 use crate::geometry::{Bounds, ClosedMesh, RayGrid, Region};
 
 /// A closed surface made ready for the rays of one grid.

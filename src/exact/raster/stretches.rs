@@ -48,7 +48,13 @@ pub struct Stretches {
 
 impl Default for Stretches {
     fn default() -> Self {
-        Self { rows: Vec::new(), faces: Vec::new(), pitch: 0, is_double: false, found: [[0.0; COLUMNS + LANES]; 3] }
+        Self {
+            rows: Vec::new(),
+            faces: Vec::new(),
+            pitch: 0,
+            is_double: false,
+            found: [[0.0; COLUMNS + LANES]; 3],
+        }
     }
 }
 
@@ -180,7 +186,8 @@ impl Tracer<'_, '_> {
             if !self.work.block.edge_on.is_empty() {
                 self.forget_edge_on(block, row);
             }
-            let [lengths_mm, entries, exits] = self.work.stretches.found.each_ref().map(|of| &of[first..last]);
+            let [lengths_mm, entries, exits] =
+                self.work.stretches.found.each_ref().map(|of| &of[first..last]);
             let ends_mm = if R::ASKS_ENDS { [entries, exits] } else { [&[][..]; 2] };
             record.passes(self.ray(row, block.columns.start + first as i32), &Passes { lengths_mm, ends_mm });
         }

@@ -156,12 +156,7 @@ impl<'v, 'a> Tracer<'v, 'a> {
         // A grid of more than 2³⁰ columns or rows is not seen.
         let pixels = |range: &Range<u32>| range.start as i32..range.end as i32;
         let asked = Pixels { columns: pixels(&region.columns), rows: pixels(&region.rows) };
-        Self {
-            view,
-            seen,
-            asked,
-            work: view.workspaces.take(),
-        }
+        Self { view, seen, asked, work: view.workspaces.take() }
     }
 
     /// Traces it all, with the widest instructions that the machine has. None of them changes a bit: every operation is
@@ -173,11 +168,12 @@ impl<'v, 'a> Tracer<'v, 'a> {
 
     #[inline(always)]
     fn trace_blocks<S: pulp::Simd, R: Record>(&mut self, simd: S, record: &mut R) {
-        let how = match (self.view.is_convex && !self.seen.source_is_inside && !R::ASKS_FACES, self.seen.is_fine) {
-            (true, true) => Way_::Chords,
-            (true, false) => Way_::Stretches,
-            (false, _) => Way_::Singly,
-        };
+        let how =
+            match (self.view.is_convex && !self.seen.source_is_inside && !R::ASKS_FACES, self.seen.is_fine) {
+                (true, true) => Way_::Chords,
+                (true, false) => Way_::Stretches,
+                (false, _) => Way_::Singly,
+            };
         let block_columns = if how == Way_::Stretches { stretches::BLOCK_COLUMNS } else { BLOCK_COLUMNS };
         let common = self.asked.intersection(&self.seen.bounds);
         for top in common.rows.clone().step_by(BLOCK_ROWS as usize) {
@@ -199,8 +195,12 @@ impl<'v, 'a> Tracer<'v, 'a> {
                 match (how, self.seen.projection.is_cone()) {
                     (Way_::Chords, true) => self.trace_block_of_chords::<true, S, R>(simd, &block, record),
                     (Way_::Chords, false) => self.trace_block_of_chords::<false, S, R>(simd, &block, record),
-                    (Way_::Stretches, true) => self.trace_block_of_stretches::<true, S, R>(simd, &block, record),
-                    (Way_::Stretches, false) => self.trace_block_of_stretches::<false, S, R>(simd, &block, record),
+                    (Way_::Stretches, true) => {
+                        self.trace_block_of_stretches::<true, S, R>(simd, &block, record)
+                    }
+                    (Way_::Stretches, false) => {
+                        self.trace_block_of_stretches::<false, S, R>(simd, &block, record)
+                    }
                     (Way_::Singly, true) => self.trace_block::<true, S>(simd, &block, record),
                     (Way_::Singly, false) => self.trace_block::<false, S>(simd, &block, record),
                 }

@@ -14,7 +14,7 @@ use crate::geometry::{Interval, RayGrid, Region, Segment, Upstream};
 const FACES_IN_CACHE: usize = 10_000;
 
 /// Over bodies of as many faces walks wait for memory, and are quicker abreast.
-const MANY_FACES: usize = 80_000;
+const MANY_FACES: usize = 5_000;
 
 /// Bodies of as many faces have none that serves many rays of an image.
 const FINE_FACES: usize = 5_000;
@@ -143,18 +143,20 @@ impl Walker {
         record: &mut R,
         mut other: impl FnMut(usize, &Segment, &mut R),
     ) {
-        let mut ranks = Ranks::default();
+        let (mut ranks, mut near) = (Ranks::default(), [None; ABREAST]);
         for (i, rays) in rays.chunks(ABREAST).enumerate() {
+            self.seeds.near_all(rays, &mut near);
             let (mut seeds, mut lines) = ([FIRST; ABREAST], [None; ABREAST]);
-            for ((seeds, line), ray) in seeds.iter_mut().zip(&mut lines).zip(rays) {
-                let (origin, dir) = (ray.line().origin(), ray.line().dir());
-                if let Some(near) = self.seeds.near(origin, dir) {
-                    (*seeds, *line) = (near, Some((origin, dir)));
+            for (((seeds, line), ray), near) in seeds.iter_mut().zip(&mut lines).zip(rays).zip(near) {
+                if let Some(near) = near {
+                    (*seeds, *line) = (near, Some((ray.line().origin(), ray.line().dir())));
                 }
             }
             self.touch(&lines[..rays.len()], &seeds);
             ranks.walk(self, &lines[..rays.len()], &seeds[..rays.len()]);
-            for (j, (seeds, ray)) in seeds.iter_mut().zip(rays).enumerate().filter(|(j, _)| lines[*j].is_some()) {
+            for (j, (seeds, ray)) in
+                seeds.iter_mut().zip(rays).enumerate().filter(|(j, _)| lines[*j].is_some())
+            {
                 let number = first + i * ABREAST + j;
                 match ranks.pass(self, j, seeds) {
                     Ok(Some(pass)) => note(record, number, &pass, ray.reach(), 1.0),
