@@ -14,7 +14,6 @@
 use glam::DVec3;
 
 use super::{Face, LineView, Pass, Seeds, Standing, Unsure, Walker, cross};
-use crate::geometry::Interval;
 
 /// Rays that are walked abreast.
 pub(super) const ABREAST: usize = 32;
@@ -34,6 +33,8 @@ pub(super) struct Ranks {
     standings: [Standing; WALKS],
     /// Numbers of the walks that are not there yet.
     walking: [u8; WALKS],
+    /// Where the last steps led.
+    stepped: [u32; WALKS],
 }
 
 impl Default for Ranks {
@@ -42,20 +43,20 @@ impl Default for Ranks {
             views: [LineView::default(); ABREAST],
             standings: [Standing::default(); WALKS],
             walking: [0; WALKS],
+            stepped: [0; WALKS],
         }
     }
 }
 
 impl Ranks {
-    /// Walks from these seeds to the entries and exits of rays (origins and directions), no more than [`ABREAST`].
+    /// Walks to the entries and exits of rays (origin, direction and seeds), no more than [`ABREAST`].
     #[inline(always)]
-    pub fn walk(&mut self, walker: &Walker, rays: &[Option<(DVec3, DVec3)>], seeds: &[Seeds]) {
+    pub fn walk(&mut self, walker: &Walker, rays: impl Iterator<Item = Option<(DVec3, DVec3, Seeds)>>) {
         let mut count = 0;
-        for (ray, (line, seeds)) in rays.iter().zip(seeds).enumerate() {
-            let Some((origin, dir)) = *line else { continue };
-            let view = &mut self.views[ray];
+        for (i, (ray, view)) in rays.zip(&mut self.views).enumerate() {
+            let Some((origin, dir, seeds)) = ray else { continue };
             *view = LineView::new(walker, origin, dir);
-            for (walk, face, sign) in [(2 * ray, seeds.entry, -1.0), (2 * ray + 1, seeds.exit, 1.0)] {
+            for (walk, face, sign) in [(2 * i, seeds.entry, -1.0), (2 * i + 1, seeds.exit, 1.0)] {
                 let standing = walker.stand_on(view, face, sign);
                 // Branches would not be foreseen.
                 self.walking[count] = walk as u8;
@@ -79,23 +80,25 @@ impl Ranks {
                 if is_on {
                     self.standings[walk] = next;
                 }
+                self.stepped[i] = next.half_edge;
             }
+            walker.read_faces(&self.stepped[..count]);
             count = left;
         }
     }
 
-    /// The way of one of the rays through the body, as of [`Walker::pass_from`]. `seeds` become the faces where its walks ended.
+    /// The way of one of the rays through the body, as of [`Walker::pass_from`], and the faces where its walks ended.
     #[inline(always)]
-    pub fn pass(&self, walker: &Walker, ray: usize, seeds: &mut Seeds) -> Result<Option<Pass>, Unsure> {
+    pub fn pass(&self, walker: &Walker, ray: usize) -> (Result<Option<Pass>, Unsure>, Seeds) {
         let (view, entry, exit) = (&self.views[ray], &self.standings[2 * ray], &self.standings[2 * ray + 1]);
-        *seeds = Seeds { entry: entry.face(), exit: exit.face() };
-        if !entry.is_surely_pierced(view) || !exit.is_surely_pierced(view) {
-            return walker.pass_from(view.origin, view.dir, seeds);
-        }
-        let start = walker.crossing_of_plane(view, seeds.entry, -1.0)?;
-        let chord = Interval::new(start, walker.crossing_of_plane(view, seeds.exit, 1.0)?);
-        let (entry_face, exit_face) = (seeds.entry, seeds.exit);
-        Ok(chord.filter(|c| c.length() > 0.0).map(|chord| Pass { chord, entry_face, exit_face }))
+        let mut seeds = Seeds { entry: entry.face(), exit: exit.face() };
+        let is_found = entry.is_surely_pierced(view) && exit.is_surely_pierced(view);
+        let answer = if is_found {
+            walker.pass_through(view, seeds)
+        } else {
+            walker.pass_from(view.origin, view.dir, &mut seeds)
+        };
+        (answer, seeds)
     }
 }
 

@@ -176,6 +176,15 @@ impl Walker {
         Ok(chord.filter(|c| c.length() > 0.0).map(|chord| Pass { chord, entry_face, exit_face }))
     }
 
+    /// The way through two faces that the line surely pierces.
+    #[inline(always)]
+    fn pass_through(&self, view: &LineView, faces: Seeds) -> Result<Option<Pass>, Unsure> {
+        let start = self.crossing_of_plane(view, faces.entry, -1.0)?;
+        let chord = Interval::new(start, self.crossing_of_plane(view, faces.exit, 1.0)?);
+        let through = |chord| Pass { chord, entry_face: faces.entry, exit_face: faces.exit };
+        Ok(chord.filter(|c| c.length() > 0.0).map(through))
+    }
+
     /// The face pierced among those that look along the line (`sign` 1) or against it (−1), walking from `at`. `None` if
     /// the line passes outside the outline. `last` becomes the face where the walk ends.
     #[inline(never)]

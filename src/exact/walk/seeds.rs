@@ -49,7 +49,7 @@ impl Seed {
 }
 
 /// The table has a cell for some two faces, and no more than a second-level cache holds.
-const LARGEST_SIDE: usize = 256;
+const LARGEST_SIDE: usize = 512;
 const SMALLEST_SIDE: usize = 4;
 
 /// A face seen less edge-on than this looks along a line whatever the rounding.
@@ -77,7 +77,7 @@ impl SeedTable {
 
     /// The table of a body.
     pub fn new(walker: &Walker) -> Self {
-        let side = (walker.faces.len() / 2).isqrt().clamp(SMALLEST_SIDE, LARGEST_SIDE);
+        let side = (walker.faces.len() * 2).isqrt().clamp(SMALLEST_SIDE, LARGEST_SIDE);
         let bounds = Bounds::of(walker.vertices.iter().copied());
         let corners = walker.faces.iter().map(|face| face.corners.map(|v| walker.vertices[v as usize]));
         let (middle, to_ball) = ball_of_inertia(corners, bounds);
