@@ -142,12 +142,14 @@ impl Block {
     }
 }
 
-/// How the crossings in a block are found.
+/// How the rays of a block are traced.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Way_ {
-    /// Each by itself.
-    Singly,
+enum By {
+    /// Any body: each crossing by itself.
+    Crossings,
+    /// A convex body of small faces seen from without: see `chords`.
     Chords,
+    /// One of large faces: see `stretches`.
     Stretches,
 }
 
@@ -168,13 +170,13 @@ impl<'v, 'a> Tracer<'v, 'a> {
 
     #[inline(always)]
     fn trace_blocks<S: pulp::Simd, R: Record>(&mut self, simd: S, record: &mut R) {
-        let how =
-            match (self.view.is_convex && !self.seen.source_is_inside && !R::ASKS_FACES, self.seen.is_fine) {
-                (true, true) => Way_::Chords,
-                (true, false) => Way_::Stretches,
-                (false, _) => Way_::Singly,
-            };
-        let block_columns = if how == Way_::Stretches { stretches::BLOCK_COLUMNS } else { BLOCK_COLUMNS };
+        let is_simple = self.view.is_convex && !self.seen.source_is_inside && !R::ASKS_FACES;
+        let by = match (is_simple, self.seen.is_fine) {
+            (true, true) => By::Chords,
+            (true, false) => By::Stretches,
+            (false, _) => By::Crossings,
+        };
+        let block_columns = if by == By::Stretches { stretches::BLOCK_COLUMNS } else { BLOCK_COLUMNS };
         let common = self.asked.intersection(&self.seen.bounds);
         for top in common.rows.clone().step_by(BLOCK_ROWS as usize) {
             let rows = top..(top + BLOCK_ROWS).min(common.rows.end);
@@ -192,17 +194,17 @@ impl<'v, 'a> Tracer<'v, 'a> {
                 if near.is_empty() && !self.seen.source_is_inside {
                     continue;
                 }
-                match (how, self.seen.projection.is_cone()) {
-                    (Way_::Chords, true) => self.trace_block_of_chords::<true, S, R>(simd, &block, record),
-                    (Way_::Chords, false) => self.trace_block_of_chords::<false, S, R>(simd, &block, record),
-                    (Way_::Stretches, true) => {
+                match (by, self.seen.projection.is_cone()) {
+                    (By::Chords, true) => self.trace_block_of_chords::<true, S, R>(simd, &block, record),
+                    (By::Chords, false) => self.trace_block_of_chords::<false, S, R>(simd, &block, record),
+                    (By::Stretches, true) => {
                         self.trace_block_of_stretches::<true, S, R>(simd, &block, record)
                     }
-                    (Way_::Stretches, false) => {
+                    (By::Stretches, false) => {
                         self.trace_block_of_stretches::<false, S, R>(simd, &block, record)
                     }
-                    (Way_::Singly, true) => self.trace_block::<true, S>(simd, &block, record),
-                    (Way_::Singly, false) => self.trace_block::<false, S>(simd, &block, record),
+                    (By::Crossings, true) => self.trace_block::<true, S>(simd, &block, record),
+                    (By::Crossings, false) => self.trace_block::<false, S>(simd, &block, record),
                 }
             }
         }

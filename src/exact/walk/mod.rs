@@ -56,7 +56,7 @@ pub struct Seeds {
     pub exit: u32,
 }
 
-/// A convex body made ready for walks: 76 bytes a face, and a table of seeds of up to half a megabyte.
+/// A convex body made ready for walks: 76 bytes a face, and a table of seeds of 16 bytes a face, up to two megabytes.
 #[derive(Clone, Debug)]
 pub struct Walker {
     faces: Vec<Face>,

@@ -48,7 +48,7 @@ impl Seed {
     }
 }
 
-/// The table has a cell for some two faces, and no more than a second-level cache holds.
+/// The table has two cells for each face, so that most walks are of a step or none, up to two megabytes.
 const LARGEST_SIDE: usize = 512;
 const SMALLEST_SIDE: usize = 4;
 
