@@ -23,7 +23,7 @@ use crate::geometry::{RayGrid, Upstream};
 
 /// Pixels of the body's rectangle for each face, at most. Where faces cover more, quotients at once are quicker than depths that
 /// are gone through again.
-pub const MOST_PIXELS: usize = 64;
+pub const MOST_PIXELS: usize = 32;
 
 /// Stands for no depth: those are no less than 0. Alike for both ways, so that the length between is 0.
 const UNSET: f64 = -1.0;
