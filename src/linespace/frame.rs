@@ -57,27 +57,41 @@ impl LineFrame {
         self.to_unit.matrix3.transpose() * normal
     }
 
-    /// The axis along which a direction of the frame is dominant; equal components go to the earlier axis.
-    #[inline]
-    pub fn dominant(d: DVec3) -> usize {
-        let a = d.abs();
-        if a.x >= a.y && a.x >= a.z { 0 } else { 1 + usize::from(a.z > a.y) }
+    /// The axis along which a line of the world, from `o` along `d`, is dominant in the frame, equal components going to the
+    /// earlier axis; and where it meets the planes of that axis' pair. Nothing of it branches, so that many lines may be placed
+    /// at a time, with the same bits.
+    #[inline(always)]
+    pub fn place(&self, o: [f64; 3], d: [f64; 3]) -> (u64, [f64; 4]) {
+        let [x, y, z] = self.to_unit.matrix3.to_cols_array_2d();
+        let moved = self.to_unit.translation.to_array();
+        let turned =
+            |v: [f64; 3]| -> [f64; 3] { std::array::from_fn(|a| x[a] * v[0] + y[a] * v[1] + z[a] * v[2]) };
+        let (o, d) = (turned(o), turned(d));
+        let o: [f64; 3] = std::array::from_fn(|a| o[a] + moved[a]);
+        let size = d.map(f64::abs);
+        let is_x = (size[0] >= size[1]) & (size[0] >= size[2]);
+        let is_z = !is_x & (size[2] > size[1]);
+        let pick = |x: f64, y: f64, z: f64| {
+            if is_x {
+                x
+            } else if is_z {
+                z
+            } else {
+                y
+            }
+        };
+        let inverse = 1.0 / pick(d[0], d[1], d[2]);
+        let height = pick(o[0], o[1], o[2]);
+        let (slope_i, slope_j) = (pick(d[1], d[2], d[0]) * inverse, pick(d[2], d[0], d[1]) * inverse);
+        let (s, t) = (pick(o[1], o[2], o[0]) - height * slope_i, pick(o[2], o[0], o[1]) - height * slope_j);
+        let axis = if is_x { 0 } else { 1 + u64::from(is_z) };
+        (axis, [s, t, s + slope_i, t + slope_j])
     }
 
     /// The plane pair of an axis.
     #[inline]
     pub fn pair(axis: usize) -> PlanePair {
         PlanePair::ALL[2 * axis]
-    }
-
-    /// Where the line through `o` along `d`, both of the frame, meets the planes of the pair of `axis`.
-    #[inline]
-    pub fn intercepts(axis: usize, o: DVec3, d: DVec3) -> [f64; 4] {
-        let [k, i, j] = [axis, (axis + 1) % 3, (axis + 2) % 3];
-        let inverse = 1.0 / d[k];
-        let (slope_i, slope_j) = (d[i] * inverse, d[j] * inverse);
-        let (s, t) = (o[i] - o[k] * slope_i, o[j] - o[k] * slope_j);
-        [s, t, s + slope_i, t + slope_j]
     }
 
     /// The vector whose product with a way in the frame is that of `normal` with the way in the world, mm.
@@ -119,9 +133,10 @@ mod tests {
         )
         .expect("not flat");
         for (o, d) in [(DVec3::new(9.0, 3.0, -2.0), DVec3::X), (DVec3::ZERO, DVec3::new(-0.2, 0.9, 0.4))] {
-            let (o_unit, d_unit) = (frame.point(o), frame.vector(d));
-            let axis = LineFrame::dominant(d_unit);
-            let [start, end] = frame.ends(axis, LineFrame::intercepts(axis, o_unit, d_unit));
+            let (axis, stuv) = frame.place(o.to_array(), d.to_array());
+            let size = frame.vector(d).abs();
+            assert_eq!(size[axis as usize], size.max_element());
+            let [start, end] = frame.ends(axis as usize, stuv);
             for place in [start, end] {
                 let off = (place - o).cross(d).length() / d.length();
                 assert!(off < 1e-9 * place.distance(o).max(1.0), "{off}");

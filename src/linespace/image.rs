@@ -172,20 +172,39 @@ pub struct Runs {
     rows: usize,
     starts: [i32; MOST_ROWS],
     ends: [i32; MOST_ROWS],
+    /// Of the rectangle around all pixels: the first and the last column, then the first and the last row that has pixels.
+    bounds: Option<[i32; 4]>,
 }
 
 impl Runs {
     /// The part of a region of at most [`MOST_ROWS`] rows that `run` keeps of each row.
     pub fn of_rows(region: &Region, run: impl Fn(u32) -> std::ops::Range<u32>) -> Self {
         let rows = region.rows.len().min(MOST_ROWS);
-        let mut runs =
-            Self { first_row: region.rows.start, rows, starts: [0; MOST_ROWS], ends: [0; MOST_ROWS] };
+        let mut runs = Self {
+            first_row: region.rows.start,
+            rows,
+            starts: [0; MOST_ROWS],
+            ends: [0; MOST_ROWS],
+            bounds: None,
+        };
         for (i, row) in region.rows.clone().take(rows).enumerate() {
             let kept = run(row);
-            runs.starts[i] = kept.start.max(region.columns.start) as i32;
-            runs.ends[i] = kept.end.min(region.columns.end) as i32;
+            let start = kept.start.clamp(region.columns.start, region.columns.end);
+            runs.starts[i] = start as i32;
+            runs.ends[i] = kept.end.clamp(start, region.columns.end) as i32;
         }
-        runs
+        runs.bounded()
+    }
+
+    /// Whether there are no pixels.
+    pub fn is_empty(&self) -> bool {
+        self.bounds.is_none()
+    }
+
+    /// The run of pixels of one of the region's rows.
+    pub fn of_row(&self, row: u32) -> std::ops::Range<u32> {
+        let i = (row - self.first_row) as usize;
+        self.starts[i] as u32..self.ends[i] as u32
     }
 
     /// Each row's run of pixels that is not empty.
@@ -195,26 +214,26 @@ impl Runs {
             .map(|(i, (start, end))| (self.first_row + i as u32, *start as u32..*end as u32))
     }
 
-    /// The rectangle around all pixels. `None` if there are none.
-    fn bounds(&self) -> Option<[f64; 4]> {
-        let (mut left, mut right, mut top, mut bottom) = (i32::MAX, i32::MIN, usize::MAX, 0);
-        for i in 0..self.rows {
-            if self.starts[i] < self.ends[i] {
-                left = left.min(self.starts[i]);
-                right = right.max(self.ends[i] - 1);
-                top = top.min(i);
-                bottom = i;
-            }
+    /// The same, with its rectangle found anew.
+    fn bounded(mut self) -> Self {
+        let (mut left, mut right, mut top, mut bottom) = (i32::MAX, i32::MIN, i32::MAX, i32::MIN);
+        for (i, (&start, &end)) in (0..).zip(self.starts.iter().zip(&self.ends).take(self.rows)) {
+            let is_empty = start >= end;
+            left = left.min(if is_empty { i32::MAX } else { start });
+            right = right.max(if is_empty { i32::MIN } else { end - 1 });
+            top = top.min(if is_empty { i32::MAX } else { i });
+            bottom = bottom.max(if is_empty { i32::MIN } else { i });
         }
-        let row = |i: usize| f64::from(self.first_row) + i as f64;
-        (left <= right).then(|| [f64::from(left), f64::from(right), row(top), row(bottom)])
+        self.bounds = (left <= right).then_some([left, right, top, bottom]);
+        self
     }
 
     /// Parts the pixels by whether `form` is at least 0 there, and visits the parts that are not empty: first those below.
     pub fn cut(&self, form: &PixelForm, mut visit: impl FnMut(bool, &Self)) {
-        let Some([left, right, top, bottom]) = self.bounds() else { return };
-        let corners =
-            [(left, top), (right, top), (left, bottom), (right, bottom)].map(|(c, r)| form.at(c, r));
+        let Some([left, right, top, bottom]) = self.bounds else { return };
+        let row = |i: i32| f64::from(self.first_row) + f64::from(i);
+        let corners = [(left, top), (right, top), (left, bottom), (right, bottom)]
+            .map(|(c, r)| form.at(f64::from(c), row(r)));
         if corners.iter().all(|&x| x >= 0.0) {
             return visit(true, self);
         }
@@ -224,7 +243,7 @@ impl Runs {
         let (mut below, mut above) = (self.clone(), self.clone());
         if form.column == 0.0 {
             for i in 0..self.rows {
-                let is_above = form.at(0.0, f64::from(self.first_row) + i as f64) >= 0.0;
+                let is_above = form.at(0.0, row(i as i32)) >= 0.0;
                 let emptied = if is_above { &mut below } else { &mut above };
                 emptied.ends[i] = emptied.starts[i];
             }
@@ -243,9 +262,9 @@ impl Runs {
                 second.starts[i] = at;
             }
         }
-        for (side, part) in [(false, &below), (true, &above)] {
-            if part.iter().next().is_some() {
-                visit(side, part);
+        for (side, part) in [(false, below.bounded()), (true, above.bounded())] {
+            if !part.is_empty() {
+                visit(side, &part);
             }
         }
     }

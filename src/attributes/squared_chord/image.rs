@@ -11,12 +11,15 @@
 //! polynomial of degree 3 in column and row, and with the squared lengths W of the path in mm and B in the frame,
 //! L² = G · W / (w B²). Per pixel: three products and sums, a root, and what all leaves of a row share.
 
+mod factors;
+
 use std::ops::Range;
 use std::sync::OnceLock;
 
 use nalgebra::SMatrix;
 use pulp::{Simd, WithSimd};
 
+use self::factors::{FillFactors, RowFactors, cubic_at};
 use super::outline::rows_within;
 use super::planes::ClipRuns;
 use super::{ChordLeaf, SquaredChord};
@@ -113,12 +116,9 @@ impl<'a> ImageChords<'a> {
         cache: &Cache,
         found: &mut ImageLengths,
     ) {
-        // Block by block, so that what is filled is still near when it is written to.
-        for row in block.rows.clone() {
-            found.lengths[place_in(region, row, &block.columns)].fill(0.0);
-        }
         let pixels = Runs::of_rows(block, |row| self.rows[row as usize].clone());
-        if pixels.iter().next().is_none() {
+        clear_around(&pixels, block, region, found.lengths);
+        if pixels.is_empty() {
             return;
         }
         let arch = crate::dispatch::arch();
@@ -134,7 +134,7 @@ impl<'a> ImageChords<'a> {
             };
             arch.dispatch(fill);
             tree.visit(LineFrame::pair(axis), &forms, pixels, cache, &mut |leaf, pixels| match leaf {
-                ChordLeaf::Empty => {}
+                ChordLeaf::Empty => clear(pixels, region, found.lengths),
                 ChordLeaf::Planes(few) => arch.dispatch(ClipRuns {
                     planes: &tree.fit().plane_forms(few, &self.lines, axis),
                     path_mm: self.lines.path_mm(),
@@ -143,7 +143,10 @@ impl<'a> ImageChords<'a> {
                     lengths: found.lengths,
                     middles: found.middles.as_deref_mut(),
                 }),
-                ChordLeaf::Traced => found.open.extend(pixels.iter()),
+                ChordLeaf::Traced => {
+                    clear(pixels, region, found.lengths);
+                    found.open.extend(pixels.iter());
+                }
                 ChordLeaf::Model(model) => {
                     let first_open = found.open.len();
                     arch.dispatch(Evaluate {
@@ -227,49 +230,19 @@ pub(super) fn place_in(region: &Region, row: u32, columns: &Range<u32>) -> Range
     start..start + columns.len()
 }
 
-/// W / (w B²) of each pixel of a block.
-struct RowFactors {
-    of_rows: Vec<[f64; BLOCK as usize]>,
-}
-
-impl RowFactors {
-    fn new() -> Self {
-        Self { of_rows: vec![[0.0; BLOCK as usize]; MOST_ROWS] }
+/// Writes 0 for some pixels.
+fn clear(pixels: &Runs, region: &Region, lengths: &mut [f64]) {
+    for (row, columns) in pixels.iter() {
+        lengths[place_in(region, row, &columns)].fill(0.0);
     }
 }
 
-struct FillFactors<'e> {
-    factors: &'e mut RowFactors,
-    lines: &'e ImageLines,
-    denominator: PixelForm,
-    origin: [u32; 2],
-    pixels: &'e Runs,
-}
-
-impl WithSimd for FillFactors<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let [left, top] = self.origin;
-        for (row, columns) in self.pixels.iter() {
-            let r = f64::from(row);
-            // The squares are quadratic in the column, counted from the block's first.
-            let square = |path: &[PixelForm; 3]| {
-                let [x, y, z] = path.each_ref().map(|form| [form.at(f64::from(left), r), form.per_column()]);
-                let product = |i: usize, j: usize| x[i] * x[j] + y[i] * y[j] + z[i] * z[j];
-                [product(0, 0), 2.0 * product(0, 1), product(1, 1)]
-            };
-            let [w0, w1, w2] = square(self.lines.path_mm());
-            let [b0, b1, b2] = square(self.lines.path());
-            let [d0, d1] = [self.denominator.at(f64::from(left), r), self.denominator.per_column()];
-            let of_row = &mut self.factors.of_rows[(row - top) as usize];
-            let first = (columns.start - left) as usize;
-            for (i, factor) in of_row[first..first + columns.len()].iter_mut().enumerate() {
-                let c = (first as i32 + i as i32) as f64;
-                let b = (b2 * c + b1) * c + b0;
-                *factor = ((w2 * c + w1) * c + w0) / ((d1 * c + d0) * (b * b));
-            }
+/// Writes 0 for all pixels of a block but some, so that each pixel is written to once.
+fn clear_around(pixels: &Runs, block: &Region, region: &Region, lengths: &mut [f64]) {
+    for row in block.rows.clone() {
+        let kept = pixels.of_row(row);
+        for columns in [block.columns.start..kept.start, kept.end..block.columns.end] {
+            lengths[place_in(region, row, &columns)].fill(0.0);
         }
     }
 }
@@ -359,27 +332,35 @@ impl WithSimd for Evaluate<'_> {
     fn with_simd<S: Simd>(self, _: S) {
         let [left, top] = self.origin;
         for (row, columns) in self.pixels.iter() {
-            let [g0, g1, g2, g3] = self.on_image.of_row(f64::from(row - top) * STEP);
+            let cubic = self.on_image.of_row(f64::from(row - top) * STEP);
             let threshold = self.on_image.threshold_of(row);
-            let first = (columns.start - left) as usize;
-            let factors = &self.factors.of_rows[(row - top) as usize][first..first + columns.len()];
+            let row_of_block = (row - top) as usize;
+            let first = (columns.start - left) as i32;
+            let x_of = |i: usize| f64::from(first + i as i32) * STEP;
             let lengths = &mut self.lengths[place_in(self.region, row, &columns)];
-            let g_at = |i: usize| {
-                let x = (first as i32 + i as i32) as f64 * STEP;
-                ((g3 * x + g2) * x + g1) * x + g0
-            };
             let mut doubtful = 0;
-            for (i, (length, factor)) in lengths.iter_mut().zip(factors).enumerate() {
-                let g = g_at(i);
-                // Written so that NaN is traced.
+            // Written so that NaN is traced.
+            let mut length_of = |g: f64, factor: f64| {
                 let is_known = g >= threshold;
                 doubtful += u64::from(!is_known);
-                *length = (g * factor).sqrt();
+                (g * factor).sqrt()
+            };
+            if self.factors.are_cubic {
+                let factor = &self.factors.cubics[row_of_block];
+                for (i, length) in lengths.iter_mut().enumerate() {
+                    let x = x_of(i);
+                    *length = length_of(cubic_at(&cubic, x), cubic_at(factor, x));
+                }
+            } else {
+                let factors = &self.factors.of_rows[row_of_block][first as usize..];
+                for (i, (length, factor)) in lengths.iter_mut().zip(factors).enumerate() {
+                    *length = length_of(cubic_at(&cubic, x_of(i)), *factor);
+                }
             }
             if doubtful > 0 {
                 let mut start = None;
                 for i in 0..=columns.len() {
-                    let is_known = i == columns.len() || g_at(i) >= threshold;
+                    let is_known = i == columns.len() || cubic_at(&cubic, x_of(i)) >= threshold;
                     match (start, is_known) {
                         (None, false) => start = Some(i),
                         (Some(from), true) => {

@@ -126,6 +126,12 @@ pub enum Known {
     Nothing,
 }
 
+/// Whether a line with such intercepts may meet the box. What overflowed is in no range, but that proves no miss.
+#[inline]
+fn may_meet(stuv: &[f64; 4]) -> bool {
+    is_in_range(stuv) || stuv.iter().any(|x| !x.is_finite())
+}
+
 /// The frame of a map that makes about a ball of radius 1 of a body.
 fn frame_of(body: &Body, middle: DVec3, to_ball: DMat3) -> Option<LineFrame> {
     // A hundredth more does no harm.
@@ -172,11 +178,8 @@ impl<'a> SquaredChord<'a> {
     /// The line's place among the leaves. `None` if it passes the body's box by.
     #[inline]
     pub fn place_of(&self, line: &Line) -> Option<(PlanePair, [f64; 4])> {
-        let (o, d) = (self.frame.point(line.origin()), self.frame.vector(line.dir()));
-        let axis = LineFrame::dominant(d);
-        let stuv = LineFrame::intercepts(axis, o, d);
-        // What overflowed is in no range, but that proves no miss.
-        (is_in_range(&stuv) || stuv.iter().any(|x| !x.is_finite())).then_some((LineFrame::pair(axis), stuv))
+        let (axis, stuv) = self.frame.place(line.origin().to_array(), line.dir().to_array());
+        may_meet(&stuv).then_some((LineFrame::pair(axis as usize), stuv))
     }
 
     /// What a leaf knows of a line at `stuv`.
