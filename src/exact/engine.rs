@@ -37,9 +37,10 @@ mod cost {
         RASTER_FACE * faces + RASTER_ROW * (faces * pixels).sqrt() + RASTER_PIXEL * pixels
     }
 
-    /// To walk for so many pixels, each from its neighbour, which is many faces away if pixels are few.
+    /// To walk for so many pixels, each from its neighbour, which is many faces away if pixels are few; then from a table.
     pub fn walk(faces: f64, pixels: f64) -> f64 {
-        (50.0 + 4.0 * faces.sqrt().sqrt()) * pixels + 80.0 * (faces * pixels).sqrt()
+        let from_pixel_to_pixel = 80.0 * (faces * pixels).sqrt();
+        (40.0 + 3.0 * faces.sqrt().sqrt()) * pixels + from_pixel_to_pixel.min(110.0 * pixels)
     }
 
     /// To descend the hierarchy for each pixel.

@@ -86,10 +86,10 @@ impl Row {
     #[inline(always)]
     fn covered_once(&self) -> Option<[usize; 2]> {
         let (mut changes, mut count, mut differ) = ([0; WORDS], 0, 0);
-        for word in 0..WORDS {
+        for (word, changes) in changes.iter_mut().enumerate() {
             let of_entries = self.starts[0][word] ^ self.ends[0][word];
             let of_exits = self.starts[1][word] ^ self.ends[1][word];
-            changes[word] = of_entries;
+            *changes = of_entries;
             count += of_entries.count_ones();
             differ |= of_entries ^ of_exits;
         }
@@ -237,8 +237,8 @@ impl Tracer<'_, '_> {
         let faces_seen = &self.work.block.faces;
         // At the first column both change.
         let ([mut face_in, mut face_out], mut from) = ([of_ins[first], of_outs[first]], first);
-        for word in first / 64..WORDS {
-            let mut bits = ins[word] | outs[word];
+        for (word, (&ins, &outs)) in ins.iter().zip(outs).enumerate().skip(first / 64) {
+            let mut bits = ins | outs;
             // The end of the row ends the last stretch.
             if last / 64 == word {
                 bits |= 1 << (last % 64);
@@ -255,8 +255,8 @@ impl Tracer<'_, '_> {
                 }
                 from = to;
                 // By bits: no branch could foresee which of the two changes.
-                face_in = either(ins[word] >> bit & 1, of_ins[from], face_in);
-                face_out = either(outs[word] >> bit & 1, of_outs[from], face_out);
+                face_in = either(ins >> bit & 1, of_ins[from], face_in);
+                face_out = either(outs >> bit & 1, of_outs[from], face_out);
             }
         }
     }

@@ -92,13 +92,21 @@ impl SeedTable {
             cells: vec![Seed::default(); side * side],
         };
         let from_ball = to_ball.inverse();
-        let rows = table.cells.par_chunks_mut(side).enumerate();
-        rows.for_each(|(row, cells)| {
-            // Each walk begins next to where the last ended.
-            let mut face = 0;
+        // Each walk begins next to where the last ended: down the first column, then along the rows.
+        let leaving = |column: usize, row: usize, near: u32| {
+            let place = [column, row].map(|c| (c as f64 + 0.5) / side as f64);
+            leaving(walker, middle, from_ball * direction(place), near)
+        };
+        let mut face = 0;
+        let mut first_of_row = |row: usize| {
+            face = leaving(0, row, face);
+            face
+        };
+        let firsts: Vec<u32> = (0..side).map(&mut first_of_row).collect();
+        let rows = table.cells.par_chunks_mut(side).zip(firsts).enumerate();
+        rows.for_each(|(row, (cells, mut face))| {
             for (column, cell) in cells.iter_mut().enumerate() {
-                let towards = from_ball * direction([column, row].map(|c| (c as f64 + 0.5) / side as f64));
-                face = leaving(walker, middle, towards, face);
+                face = leaving(column, row, face);
                 let corner = walker.vertices[walker.faces[face as usize].corners[0] as usize];
                 *cell = Seed { face, radius: radius_squared(&corner).sqrt() as f32 };
             }

@@ -5,8 +5,9 @@ use std::hint::black_box;
 use super::abreast::{ABREAST, Ranks};
 use super::held::{Alone, Followers, Holding};
 use super::{Pass, Seeds, Unsure, Walker};
+use crate::exact::raster::pixels_around;
 use crate::exact::{Record, Way};
-use crate::geometry::{Interval, RayGrid, Region, Segment, Upstream};
+use crate::geometry::{Bounds, Interval, RayGrid, Region, Segment, Upstream};
 
 /// Bodies of fewer faces stay in the second-level cache, where reading ahead gains nothing.
 const FACES_IN_CACHE: usize = 10_000;
@@ -16,6 +17,9 @@ const MANY_FACES: usize = 80_000;
 
 /// Bodies of as many faces have none that serves many rays of an image.
 const FINE_FACES: usize = 5_000;
+
+/// Faces for each pixel of the body's rectangle from which on walks begin by the table.
+const SPARSE_FACES: u64 = 2;
 
 /// Fewer rows are walked sooner one by one than abreast.
 const WORTH_IT: usize = 8;
@@ -49,6 +53,10 @@ impl Walker {
         record: &mut R,
         mut other: impl FnMut(usize, &Segment, &mut R),
     ) {
+        // From pixel to pixel would then be farther than from the table's face.
+        let (low, high) = (self.centre - self.reach, self.centre + self.reach);
+        let pixels = pixels_around(&Bounds::of([low, high]), grid);
+        let is_sparse = self.faces.len() as u64 > SPARSE_FACES * pixels;
         let mut ranks = Ranks::default();
         for top in region.rows.clone().step_by(ABREAST) {
             let rows = top..region.rows.end.min(top + ABREAST as u32);
@@ -63,8 +71,10 @@ impl Walker {
                     if has_missed[j] && self.seeds.passes_by(origin, dir) {
                         continue;
                     }
-                    let near = seeds[j].unwrap_or_else(|| self.seeds.near(origin, dir).unwrap_or(FIRST));
-                    lines[j] = Some((origin, dir, near));
+                    let last = seeds[j].filter(|_| !is_sparse);
+                    let near = last.or_else(|| self.seeds.near(origin, dir));
+                    has_missed[j] = near.is_none();
+                    lines[j] = near.map(|near| (origin, dir, near));
                 }
                 ranks.walk(self, lines[..rows.len()].iter().copied());
                 for (j, row) in rows.clone().enumerate() {
