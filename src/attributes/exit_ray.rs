@@ -4,7 +4,7 @@ use std::marker::PhantomData;
 
 use super::lines::SurfaceLines;
 use super::memo::Memo;
-use super::surface::{Lights, Seen, blend, distance, f32s, vector};
+use super::surface::{Seen, blend, distance, f32s, vector};
 use crate::geometry::{Ray, Real, Vec3};
 use crate::linespace::{Cell, LinePoint, PlanePair};
 use crate::ritree::Attribute;
@@ -24,8 +24,20 @@ pub struct Through {
     pub exit_dir: [f32; 3],
 }
 
+/// The way of a ray that is not followed yet.
+const UNKNOWN: u32 = u32::MAX;
+
 impl Through {
     const MISS: Self = Self { seen: Seen::MISS, way: 0, exit_point: [0.0; 3], exit_dir: [0.0; 3] };
+
+    fn outline(seen: Seen) -> Self {
+        let way = if seen == Seen::MISS { 0 } else { UNKNOWN };
+        Self { seen, way, ..Self::MISS }
+    }
+
+    fn is_finished(&self) -> bool {
+        self.way != UNKNOWN
+    }
 
     /// How often the ray is turned.
     pub fn turns(&self) -> u32 {
@@ -39,6 +51,10 @@ impl Through {
     }
 }
 
+/// How far along a ray a hit may lie from where its depth says, box units: depths of up to 1 are rounded to f32 along the
+/// axis, and rays are at most √3 times as long.
+const DEPTH_ROUNDING: f64 = 2.0 * f32::EPSILON as f64;
+
 /// How far a mirrored ray moves on what it shows, box units, by a unit turn of the normal: twice the turn, over the two and a
 /// half sides that it goes on. Measured on a waving sheet, it keeps pictures at the default threshold as true as the paper's.
 const LEVERAGE: f64 = 5.0;
@@ -47,19 +63,18 @@ const LEVERAGE: f64 = 5.0;
 ///
 /// Rays that are turned differently often, or leave by patches of different classes, are of different classes: between
 /// them the exit ray jumps.
-pub struct ExitRay<'a, L, R> {
+pub struct ExitRay<'a, R> {
     lines: SurfaceLines<'a>,
-    lights: L,
     optics: Optics,
     limit: u32,
     memo: Memo<Through>,
     number: PhantomData<R>,
 }
 
-impl<'a, L: Lights, R: Real> ExitRay<'a, L, R> {
+impl<'a, R: Real> ExitRay<'a, R> {
     /// The exit rays of a surface, after at most `limit` turns.
-    pub fn new(lines: SurfaceLines<'a>, lights: L, optics: Optics, limit: u32) -> Self {
-        Self { lines, lights, optics, limit, memo: Memo::default(), number: PhantomData }
+    pub fn new(lines: SurfaceLines<'a>, optics: Optics, limit: u32) -> Self {
+        Self { lines, optics, limit, memo: Memo::default(), number: PhantomData }
     }
 
     /// The surface's lines.
@@ -68,12 +83,30 @@ impl<'a, L: Lights, R: Real> ExitRay<'a, L, R> {
     }
 }
 
-impl<L: Lights, R: Real> Attribute for ExitRay<'_, L, R> {
+impl<R: Real> Attribute for ExitRay<'_, R> {
     type Output = Through;
     type Real = R;
 
     fn sample(&self, line: LinePoint) -> Through {
-        self.memo.recall(line, || self.trace(line))
+        let mut output = self.outline(line);
+        self.finish(line, &mut output);
+        output
+    }
+
+    /// The first hit.
+    fn outline(&self, line: LinePoint) -> Through {
+        self.memo.recall(line, || Through::outline(Seen::along::<R>(&self.lines, line)))
+    }
+
+    fn outline_class(&self, output: &Through) -> u32 {
+        output.seen.class
+    }
+
+    fn finish(&self, line: LinePoint, output: &mut Through) {
+        if !output.is_finished() {
+            let seen = output.seen;
+            *output = self.memo.recall_if(line, Through::is_finished, || self.followed(line, seen));
+        }
     }
 
     fn class(&self, output: &Through) -> u32 {
@@ -124,14 +157,18 @@ impl<L: Lights, R: Real> Attribute for ExitRay<'_, L, R> {
     }
 }
 
-impl<L: Lights, R: Real> ExitRay<'_, L, R> {
-    fn trace(&self, line: LinePoint) -> Through {
+impl<R: Real> ExitRay<'_, R> {
+    /// The whole sample of a line with a known first hit: that is found again where it is known to be, which costs little,
+    /// and the ray is followed.
+    fn followed(&self, line: LinePoint, seen: Seen) -> Through {
         let ray = self.lines.ray::<R>(line);
         let surface = self.lines.surface();
-        let Some(hit) = surface.hit(&ray, Reach::whole()) else { return Through::MISS };
+        let t = self.lines.distance_to(R::of(seen.depth.into()), &ray, line.pair);
+        let room = R::of(DEPTH_ROUNDING * self.lines.side());
+        let near = Reach { from: t - room, to: t + room, ..Reach::whole() };
+        let again = surface.hit(&ray, near).or_else(|| surface.hit(&ray, Reach::whole()));
+        let Some(hit) = again else { return Through::MISS };
         let path = follow(surface, &ray, hit, self.optics, self.limit);
-        let depth = self.lines.depth(hit.place(&ray), line.pair);
-        let seen = Seen::of(&hit, depth, self.lights.hidden(&ray, &hit));
         let (exit_point, exit_dir) =
             path.exit.map_or(([0.0; 3], [0.0; 3]), |exit| (f32s(exit.origin), f32s(exit.dir)));
         Through { seen, way: path.turns.min(0xff) | path.last_class << 8, exit_point, exit_dir }

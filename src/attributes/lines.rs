@@ -44,6 +44,11 @@ impl<'a> SurfaceLines<'a> {
         &self.space
     }
 
+    /// The cube's side, in the scene's unit: what box units are of.
+    pub fn side(&self) -> f64 {
+        self.space.size().max_element()
+    }
+
     /// A ray's line as its tree knows it.
     pub fn point<R: Real>(&self, ray: &Ray<R>) -> LinePoint {
         let pair = self.space.pair_of(ray.dir);

@@ -23,13 +23,22 @@ impl<T> Default for Memo<T> {
 }
 
 impl<T: Clone> Memo<T> {
+    /// Bytes that it holds once it is used, beside any cache: they do not grow.
+    pub const BYTES: usize = PLACES * size_of::<Place<T>>();
+
     /// The line's sample, remembered or made by `sample`.
     pub fn recall(&self, line: LinePoint, sample: impl FnOnce() -> T) -> T {
+        self.recall_if(line, |_| true, sample)
+    }
+
+    /// As [`recall`](Self::recall), but a sample that is not `enough` is made anew.
+    pub fn recall_if(&self, line: LinePoint, enough: impl Fn(&T) -> bool, sample: impl FnOnce() -> T) -> T {
         let places = self.places.get_or_init(|| (0..PLACES).map(|_| Mutex::new(None)).collect());
         let place = &places[place_of(&line)];
         let lock = || place.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((known, output)) = &*lock()
             && *known == line
+            && enough(output)
         {
             return output.clone();
         }

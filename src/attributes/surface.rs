@@ -1,10 +1,10 @@
-//! The first hit of a line on a surface: place, normal, and which lights the object itself hides.
+//! The first hit of a line on a surface: place and normal.
 
 use std::marker::PhantomData;
 
 use super::lines::SurfaceLines;
 use super::memo::Memo;
-use crate::geometry::{Ray, Real, Vec3};
+use crate::geometry::{Real, Vec3};
 use crate::linespace::{Cell, LinePoint, PlanePair};
 use crate::ritree::Attribute;
 use crate::surface::{Hit, Reach};
@@ -25,21 +25,22 @@ impl Seen {
     /// Nothing is hit.
     pub const MISS: Self = Self { class: 0, depth: 0.0, normal: [0.0; 3] };
 
-    /// The class of the patch that is hit, the side it is hit from, and the lights hidden by the object itself, a bit for
-    /// each of the first eight.
-    pub(super) fn of<R: Real>(hit: &Hit<R>, depth: R, hidden: u8) -> Self {
-        let class = 1 + (u32::from(hidden) << 2 | u32::from(hit.enters) << 1) + (hit.class << 10);
+    /// The class of the patch that is hit, and the side it is hit from.
+    pub(super) fn of<R: Real>(hit: &Hit<R>, depth: R) -> Self {
+        let class = 1 + u32::from(hit.enters) + (hit.class << 1);
         Self { class, depth: depth.get() as f32, normal: f32s(hit.normal) }
     }
 
-    /// The lights hidden by the object itself.
-    pub fn hidden(&self) -> u8 {
-        (self.class.wrapping_sub(1) >> 2) as u8
+    /// The first hit of a line.
+    pub(super) fn along<R: Real>(lines: &SurfaceLines, line: LinePoint) -> Self {
+        let ray = lines.ray::<R>(line);
+        let hit = lines.surface().hit(&ray, Reach::whole());
+        hit.map_or(Self::MISS, |hit| Self::of(&hit, lines.depth(hit.place(&ray), line.pair)))
     }
 
     /// Whether the hit comes from the side that the normal points to.
     pub fn enters(&self) -> bool {
-        self.class.wrapping_sub(1) >> 1 & 1 == 1
+        self.class.wrapping_sub(1) & 1 == 1
     }
 }
 
@@ -65,33 +66,17 @@ pub(super) fn distance<R: Real>(a: &Seen, b: &Seen, leverage: f64) -> f64 {
     (moved * moved + turned.dot(turned)).sqrt().get()
 }
 
-/// Which lights of up to eight an object hides from a hit on itself, a bit each. A place that is lit from behind is not
-/// hidden: it is dark by its normal.
-pub trait Lights: Sync {
-    /// The bits for a hit along a ray.
-    fn hidden<R: Real>(&self, ray: &Ray<R>, hit: &Hit<R>) -> u8;
-}
-
 /// The attribute of surfaces that neither mirror nor refract.
-pub struct FirstHit<'a, L, R> {
+pub struct FirstHit<'a, R> {
     lines: SurfaceLines<'a>,
-    lights: L,
     memo: Memo<Seen>,
     number: PhantomData<R>,
 }
 
-impl<'a, L: Lights, R: Real> FirstHit<'a, L, R> {
-    /// The first hits on a surface under lights.
-    pub fn new(lines: SurfaceLines<'a>, lights: L) -> Self {
-        Self { lines, lights, memo: Memo::default(), number: PhantomData }
-    }
-
-    fn trace(&self, line: LinePoint) -> Seen {
-        let ray = self.lines.ray::<R>(line);
-        self.lines.surface().hit(&ray, Reach::whole()).map_or(Seen::MISS, |hit| {
-            let depth = self.lines.depth(hit.place(&ray), line.pair);
-            Seen::of(&hit, depth, self.lights.hidden(&ray, &hit))
-        })
+impl<'a, R: Real> FirstHit<'a, R> {
+    /// The first hits on a surface.
+    pub fn new(lines: SurfaceLines<'a>) -> Self {
+        Self { lines, memo: Memo::default(), number: PhantomData }
     }
 
     /// The surface's lines.
@@ -100,12 +85,12 @@ impl<'a, L: Lights, R: Real> FirstHit<'a, L, R> {
     }
 }
 
-impl<L: Lights, R: Real> Attribute for FirstHit<'_, L, R> {
+impl<R: Real> Attribute for FirstHit<'_, R> {
     type Output = Seen;
     type Real = R;
 
     fn sample(&self, line: LinePoint) -> Seen {
-        self.memo.recall(line, || self.trace(line))
+        self.memo.recall(line, || Seen::along::<R>(&self.lines, line))
     }
 
     fn class(&self, output: &Seen) -> u32 {

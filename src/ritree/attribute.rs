@@ -17,6 +17,20 @@ pub trait Attribute: Sync {
     /// The exact output of a line.
     fn sample(&self, line: LinePoint) -> Self::Output;
 
+    /// As much of the output as tells its [`outline_class`](Self::outline_class): corners are sampled so, since most lie where
+    /// a discontinuity is cut out, and [finished](Self::finish) where their cell lies on one side.
+    fn outline(&self, line: LinePoint) -> Self::Output {
+        self.sample(line)
+    }
+
+    /// What is known of the class from the outline: where it differs, classes do.
+    fn outline_class(&self, output: &Self::Output) -> u32 {
+        self.class(output)
+    }
+
+    /// Makes the outline of a line its sample, unless it is.
+    fn finish(&self, _line: LinePoint, _output: &mut Self::Output) {}
+
     /// The equivalence class of the patch that the sample met; outputs are interpolated within one class only. A miss
     /// is a class too. Attributes without discontinuities have one class.
     fn class(&self, output: &Self::Output) -> u32;

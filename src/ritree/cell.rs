@@ -105,9 +105,16 @@ impl Place {
         LinePoint { pair: self.pair, stuv }
     }
 
-    /// Samples all 16 corners.
+    /// The outlines of all 16 corners.
     pub fn sample<A: Attribute>(&self, attribute: &A) -> Corners<A::Output> {
-        std::array::from_fn(|bits| attribute.sample(self.line(self.cell.corner(bits))))
+        std::array::from_fn(|bits| attribute.outline(self.line(self.cell.corner(bits))))
+    }
+
+    /// The corners' whole samples.
+    pub fn finish<A: Attribute>(&self, attribute: &A, corners: &mut Corners<A::Output>) {
+        for (bits, corner) in corners.iter_mut().enumerate() {
+            attribute.finish(self.line(self.cell.corner(bits)), corner);
+        }
     }
 
     /// The corners of the two halves: 8 of each are the cell's own, 8 new ones are sampled and shared.
@@ -121,7 +128,7 @@ impl Place {
         let is_high = |bits: usize| bits >> axis & 1 == 1;
         // The lower half's high side lies on the cut.
         let cut: [Option<A::Output>; 16] = std::array::from_fn(|bits| {
-            is_high(bits).then(|| attribute.sample(self.line(lower.corner(bits))))
+            is_high(bits).then(|| attribute.outline(self.line(lower.corner(bits))))
         });
         let on_cut = |bits: usize| cut[bits | 1 << axis].clone();
         let pick = |own: bool, bits: usize| match on_cut(bits) {
@@ -139,25 +146,22 @@ impl Place {
         self.depth >= parameters.max_depth.min(DEEPEST)
     }
 
-    /// What is to be done with the cell (§2.3, and §2.5 for its kind).
+    /// What is to be done with the cell (§2.3, and §2.5 for its kind). Its corners are finished if that tells it.
     pub fn verdict<A: Attribute>(
         &self,
         attribute: &A,
-        corners: &Corners<A::Output>,
+        corners: &mut Corners<A::Output>,
         parameters: &Parameters,
     ) -> Verdict {
         let is_deepest = self.is_deepest(parameters);
-        let class = attribute.class(&corners[0]);
-        let other = corners.iter().map(|c| attribute.class(c)).find(|&c| c != class);
-        if let Some(other) = other {
-            // No interpolant crosses a discontinuity; smaller cells leave fewer lines on it.
-            let third = corners.iter().map(|c| attribute.class(c)).any(|c| c != class && c != other);
-            return match (is_deepest, third) {
-                (false, _) => Verdict::Split,
-                (true, false) => Verdict::Final(Kind::TwoClasses),
-                (true, true) => Verdict::Final(Kind::Traced(Reason::Classes)),
-            };
+        if let Some(mixed) = mixed(corners, |c| attribute.outline_class(c), is_deepest) {
+            return mixed;
         }
+        self.finish(attribute, corners);
+        if let Some(mixed) = mixed(corners, |c| attribute.class(c), is_deepest) {
+            return mixed;
+        }
+        let class = attribute.class(&corners[0]);
         if attribute.is_miss(class) {
             return if attribute.is_certainly_empty(self.pair, &self.cell) {
                 Verdict::Final(Kind::Empty)
@@ -213,6 +217,18 @@ impl Place {
         let parts: Vec<_> = usable.iter().zip(weights).map(part).collect();
         Ok(attribute.interpolate(&parts))
     }
+}
+
+/// The verdict on a cell with corners of more than one class.
+fn mixed<T>(corners: &Corners<T>, class_of: impl Fn(&T) -> u32, is_deepest: bool) -> Option<Verdict> {
+    let class = class_of(&corners[0]);
+    let other = corners.iter().map(&class_of).find(|&c| c != class)?;
+    if !is_deepest {
+        // No interpolant crosses a discontinuity; smaller cells leave fewer lines on it.
+        return Some(Verdict::Split);
+    }
+    let third = corners.iter().map(class_of).any(|c| c != class && c != other);
+    Some(Verdict::Final(if third { Kind::Traced(Reason::Classes) } else { Kind::TwoClasses }))
 }
 
 /// Quadrilinear interpolation at fractions of the cell: bilinear in (u, v) within each directional group, the four

@@ -227,14 +227,14 @@ impl<A: Keepable> RiTree<A> {
                     self.load_cell(half, &place.half(side), from, cache, loaded)
                 })
             }
-            Record::Final(kind, corners) => {
+            Record::Final(kind, mut corners) => {
                 if !corners.iter().all(|output| self.attribute.is_sound(output)) {
                     return Err(Unreadable::damaged("a sample is not finite"));
                 }
                 let node = node.filter(|_| cache.reserve(size_of::<Leaf<A::Output>>()));
                 if loaded.count(node.is_some())
                     && (place.sample(&self.attribute) != corners
-                        || self.verdict(place, &corners) != Verdict::Final(kind))
+                        || self.verdict(place, &mut corners) != Verdict::Final(kind))
                 {
                     return Err(Unreadable::damaged("a cell is not what this program makes of it"));
                 }

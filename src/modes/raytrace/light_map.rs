@@ -1,0 +1,215 @@
+//! Which places a light reaches past one object, by a map of the object as the light sees it (§2.4, visibility).
+//!
+//! ```text
+//!        light            A place is hidden if the light's ray meets the object nearer than the place. All such rays pass
+//!          ☼              through one point, so that two coordinates tell them: a lattice of rays over the object's box
+//!         ╱│╲             knows how far they go, and in a cell whose corners and middle fit together the rays between are
+//!        ╱ │ ╲            interpolated. Inverse depths are: of a plane they are linear. Everywhere else, along outlines and
+//!       ╱ ▁▂▃ ╲           folds, the light's ray is traced.
+//!      ────●────  place
+//! ```
+//!
+//! Rays of the lattice are traced when they are asked for first. What is known of one is a function of the ray alone, so
+//! answers are the same whichever thread asks first.
+
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use glam::{DVec2, DVec3};
+
+use crate::geometry::{Ray, Real, Vec3};
+use crate::surface::{Reach, Surface};
+
+/// Cells of the lattice along each side.
+const SIDE: usize = 64;
+
+/// A place is not hidden by what lies before it by less than this share of the object's longest side: trees tell an object's
+/// own places no better.
+const SLACK: f64 = 0.01;
+
+/// An object before one light.
+pub struct LightMap<'a> {
+    surface: &'a Surface,
+    light: DVec3,
+    /// See [`SLACK`], as a length.
+    slack: f64,
+    /// `None` if the object is so near to the light that no plane shows all of it.
+    lattice: Option<Lattice>,
+}
+
+/// Rays of a light through the points of a lattice across the axis to the object's middle.
+struct Lattice {
+    axis: DVec3,
+    /// Across the axis, for columns and rows.
+    across: [DVec3; 2],
+    /// Where the object begins, in slopes to the axis, and cells per slope.
+    low: DVec2,
+    scale: DVec2,
+    /// Made when the first place is asked for.
+    table: OnceLock<Table>,
+}
+
+/// What is known of the lattice's rays and cells.
+struct Table {
+    /// Inverse depths at the (SIDE + 1)² corners, row by row, and at the SIDE² middles; 0 for a miss.
+    corners: Vec<Sample>,
+    middles: Vec<Sample>,
+    /// Cells that no part of the surface covers are never met.
+    may_be_met: Vec<bool>,
+}
+
+/// An inverse depth; not a number until the ray is traced.
+struct Sample(AtomicU64);
+
+impl Default for Sample {
+    fn default() -> Self {
+        Self(AtomicU64::new(f64::NAN.to_bits()))
+    }
+}
+
+impl<'a> LightMap<'a> {
+    /// Bytes that a map holds once it is used.
+    pub const BYTES: usize = ((SIDE + 1) * (SIDE + 1) + SIDE * SIDE) * size_of::<Sample>() + SIDE * SIDE;
+
+    /// The map of a surface before a light.
+    pub fn new(surface: &'a Surface, light: DVec3) -> Self {
+        let bounds = surface.bounds();
+        let slack = SLACK * bounds.size().max_element();
+        Self { surface, light, slack, lattice: Lattice::new(&bounds.corners(), bounds.centre() - light) }
+    }
+
+    /// Whether the surface hides the light from a place.
+    pub fn hides<R: Real>(&self, place: Vec3<R>) -> bool {
+        let way = place - Vec3::of(self.light);
+        match &self.lattice {
+            None => self.is_met_before(way),
+            Some(lattice) => lattice.hides(way, self).unwrap_or_else(|| self.is_met_before(way)),
+        }
+    }
+
+    /// Whether the light's ray meets the surface before a place that lies `way` from it.
+    fn is_met_before<R: Real>(&self, way: Vec3<R>) -> bool {
+        let far = way.length();
+        let ray = Ray { origin: Vec3::of(self.light), dir: way * (R::of(1.0) / far) };
+        self.surface.is_met(&ray, Reach { to: far - R::of(self.slack), ..Reach::whole() })
+    }
+}
+
+impl Lattice {
+    /// Over the rays to the corners of the object's box, seen along `axis`. `None` if one lies beside the light or behind it.
+    fn new(corners: &[DVec3; 8], to_middle: DVec3) -> Option<Self> {
+        let axis = to_middle.try_normalize()?;
+        let first = axis.any_orthonormal_vector();
+        let across = [first, axis.cross(first)];
+        let middle = corners.iter().sum::<DVec3>() / 8.0;
+        let slopes = corners.map(|corner| slope(axis, across, to_middle + (corner - middle)));
+        let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        for slope in slopes {
+            (low, high) = (low.min(slope?), high.max(slope?));
+        }
+        let scale = SIDE as f64 / (high - low);
+        scale.is_finite().then_some(Self { axis, across, low, scale, table: OnceLock::new() })
+    }
+
+    /// Whether a place that lies `way` from the light is hidden. `None` if that must be traced.
+    fn hides<R: Real>(&self, way: Vec3<R>, map: &LightMap) -> Option<bool> {
+        let depth = way.dot(Vec3::of(self.axis));
+        if depth.get() <= 0.0 {
+            // All of the object is on the other side.
+            return Some(false);
+        }
+        let inverse = R::of(1.0) / depth;
+        let at: [R; 2] = std::array::from_fn(|i| {
+            (way.dot(Vec3::of(self.across[i])) * inverse - R::of(self.low[i])) * R::of(self.scale[i])
+        });
+        // Beyond the object's box by more than rounding.
+        let is_outside = |x: &R| x.get() < -1e-9 || x.get() > SIDE as f64 + 1e-9;
+        if at.iter().any(is_outside) {
+            return Some(false);
+        }
+        let cell = at.map(|x| (x.get().max(0.0) as usize).min(SIDE - 1));
+        let table = self.table.get_or_init(|| self.table(map));
+        if !table.may_be_met[cell[1] * SIDE + cell[0]] {
+            return Some(false);
+        }
+        let corner = |bits: usize| {
+            let (column, row) = (cell[0] + (bits & 1), cell[1] + (bits >> 1));
+            let sample = &table.corners[row * (SIDE + 1) + column];
+            R::of(sample.known(|| self.sample::<R>(map, [column as f64, row as f64])))
+        };
+        let corners: [R; 4] = std::array::from_fn(corner);
+        if corners.iter().any(|c| c.get() == 0.0) {
+            return None;
+        }
+        let middle = table.middles[cell[1] * SIDE + cell[0]]
+            .known(|| self.sample::<R>(map, cell.map(|x| x as f64 + 0.5)));
+        // d(1/z) = −dz/z²: a length along the axis.
+        let as_length = depth * depth;
+        let mean = (corners[0] + corners[1] + corners[2] + corners[3]) * R::of(0.25);
+        if ((mean - R::of(middle)).abs() * as_length).get() > 0.5 * map.slack {
+            return None;
+        }
+        let within: [R; 2] = std::array::from_fn(|i| at[i] - R::of(cell[i] as f64));
+        let mix = |a: R, b: R, share: R| a + (b - a) * share;
+        let met =
+            mix(mix(corners[0], corners[1], within[0]), mix(corners[2], corners[3], within[0]), within[1]);
+        let before = ((met - inverse) * as_length).get();
+        // Where the interpolated depth may be off by what decides, it does not.
+        let is_doubtful = (0.5 * map.slack..2.0 * map.slack).contains(&before);
+        (!is_doubtful).then_some(before > map.slack)
+    }
+
+    /// The inverse depth at which the light's ray through a point of the lattice first meets the surface; 0 if it does not.
+    fn sample<R: Real>(&self, map: &LightMap, at: [f64; 2]) -> f64 {
+        let slopes = self.low + DVec2::from(at) / self.scale;
+        let dir = Vec3::<R>::of(self.axis)
+            + Vec3::of(self.across[0]) * R::of(slopes.x)
+            + Vec3::of(self.across[1]) * R::of(slopes.y);
+        let over = R::of(1.0) / dir.length();
+        let ray = Ray { origin: Vec3::of(map.light), dir: dir * over };
+        map.surface.hit(&ray, Reach::whole()).map_or(0.0, |hit| (R::of(1.0) / (hit.t * over)).get())
+    }
+
+    /// Nothing is known, but for the cells that no box around a part of the surface covers.
+    fn table(&self, map: &LightMap) -> Table {
+        let samples = |n: usize| (0..n).map(|_| Sample::default()).collect();
+        let mut may_be_met = vec![false; SIDE * SIDE];
+        for part in map.surface.parts() {
+            let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+            for corner in part.corners() {
+                let at = slope(self.axis, self.across, corner - map.light);
+                // A box beside the light may be anywhere.
+                let at = at.map_or([DVec2::NEG_INFINITY, DVec2::INFINITY], |at| [at, at]);
+                (low, high) = (low.min(at[0]), high.max(at[1]));
+            }
+            // With room for rounding.
+            let cell = |slope: DVec2, room: f64| {
+                ((slope - self.low) * self.scale + room).clamp(DVec2::ZERO, DVec2::splat(SIDE as f64 - 1.0))
+            };
+            let (low, high) = (cell(low, -1e-6), cell(high, 1e-6));
+            for row in low.y as usize..=high.y as usize {
+                may_be_met[row * SIDE + low.x as usize..=row * SIDE + high.x as usize].fill(true);
+            }
+        }
+        Table { corners: samples((SIDE + 1) * (SIDE + 1)), middles: samples(SIDE * SIDE), may_be_met }
+    }
+}
+
+/// The slopes to the axis of the way to a place. `None` unless it lies before the light.
+fn slope(axis: DVec3, across: [DVec3; 2], way: DVec3) -> Option<DVec2> {
+    let depth = way.dot(axis);
+    (depth > 0.0).then(|| DVec2::new(way.dot(across[0]), way.dot(across[1])) / depth)
+}
+
+impl Sample {
+    /// What is known, made by `trace` if nothing is.
+    fn known(&self, trace: impl FnOnce() -> f64) -> f64 {
+        let known = f64::from_bits(self.0.load(Ordering::Relaxed));
+        if !known.is_nan() {
+            return known;
+        }
+        let traced = trace();
+        self.0.store(traced.to_bits(), Ordering::Relaxed);
+        traced
+    }
+}
