@@ -8,8 +8,8 @@ use super::surface::{Seen, blend, distance, f32s, vector};
 use crate::geometry::{Ray, Real, Vec3};
 use crate::linespace::{Cell, LinePoint, PlanePair};
 use crate::ritree::Attribute;
-use crate::surface::Reach;
 use crate::surface::optics::{Optics, follow, reflected};
+use crate::surface::{Hit, Reach};
 
 /// The first hit of a line, and the ray that leaves the object at last: {normal, point, exit point, exit direction}.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +23,9 @@ pub struct Through {
     /// Which way, unit length; zero if it does not leave within the limit.
     pub exit_dir: [f32; 3],
 }
+
+/// A line's sample with the first hit that it was made of.
+pub type Known<R> = (Through, Option<Hit<R>>);
 
 /// The way of a ray that is not followed yet.
 const UNKNOWN: u32 = u32::MAX;
@@ -67,7 +70,7 @@ pub struct ExitRay<'a, R> {
     lines: SurfaceLines<'a>,
     optics: Optics,
     limit: u32,
-    memo: Memo<Through>,
+    memo: Memo<Known<R>>,
     number: PhantomData<R>,
 }
 
@@ -95,7 +98,11 @@ impl<R: Real> Attribute for ExitRay<'_, R> {
 
     /// The first hit.
     fn outline(&self, line: LinePoint) -> Through {
-        self.memo.recall(line, || Through::outline(Seen::along::<R>(&self.lines, line)))
+        let outline = || {
+            let (seen, hit) = Seen::along::<R>(&self.lines, line);
+            (Through::outline(seen), hit)
+        };
+        self.memo.recall(line, outline).0
     }
 
     fn outline_class(&self, output: &Through) -> u32 {
@@ -104,8 +111,11 @@ impl<R: Real> Attribute for ExitRay<'_, R> {
 
     fn finish(&self, line: LinePoint, output: &mut Through) {
         if !output.is_finished() {
-            let seen = output.seen;
-            *output = self.memo.recall_if(line, Through::is_finished, || self.followed(line, seen));
+            *output = match self.memo.get(&line) {
+                Some((known, _)) if known.is_finished() => known,
+                Some((_, hit)) => self.followed(line, output.seen, hit),
+                None => self.followed(line, output.seen, None),
+            };
         }
     }
 
@@ -158,20 +168,22 @@ impl<R: Real> Attribute for ExitRay<'_, R> {
 }
 
 impl<R: Real> ExitRay<'_, R> {
-    /// The whole sample of a line with a known first hit: that is found again where it is known to be, which costs little,
-    /// and the ray is followed.
-    fn followed(&self, line: LinePoint, seen: Seen) -> Through {
+    /// The whole sample of a line whose first hit is known, or is found again where it must be.
+    fn followed(&self, line: LinePoint, seen: Seen, hit: Option<Hit<R>>) -> Through {
         let ray = self.lines.ray::<R>(line);
         let surface = self.lines.surface();
-        let t = self.lines.distance_to(R::of(seen.depth.into()), &ray, line.pair);
-        let room = R::of(DEPTH_ROUNDING * self.lines.side());
-        let near = Reach { from: t - room, to: t + room, ..Reach::whole() };
-        let again = surface.hit(&ray, near).or_else(|| surface.hit(&ray, Reach::whole()));
-        let Some(hit) = again else { return Through::MISS };
+        let again = || {
+            let t = self.lines.distance_to(R::of(seen.depth.into()), &ray, line.pair);
+            let room = R::of(DEPTH_ROUNDING * self.lines.side());
+            let near = Reach { from: t - room, to: t + room, ..Reach::whole() };
+            surface.hit(&ray, near).or_else(|| surface.hit(&ray, Reach::whole()))
+        };
+        let Some(hit) = hit.or_else(again) else { return Through::MISS };
         let path = follow(surface, &ray, hit, self.optics, self.limit);
         let (exit_point, exit_dir) =
             path.exit.map_or(([0.0; 3], [0.0; 3]), |exit| (f32s(exit.origin), f32s(exit.dir)));
-        Through { seen, way: path.turns.min(0xff) | path.last_class << 8, exit_point, exit_dir }
+        let way = path.turns.min(0xff) | path.last_class << 8;
+        self.memo.put(line, (Through { seen, way, exit_point, exit_dir }, Some(hit))).0
     }
 
     fn is_plain_mirror(&self, output: &Through) -> bool {

@@ -28,23 +28,24 @@ impl<T: Clone> Memo<T> {
 
     /// The line's sample, remembered or made by `sample`.
     pub fn recall(&self, line: LinePoint, sample: impl FnOnce() -> T) -> T {
-        self.recall_if(line, |_| true, sample)
+        self.get(&line).unwrap_or_else(|| self.put(line, sample()))
     }
 
-    /// As [`recall`](Self::recall), but a sample that is not `enough` is made anew.
-    pub fn recall_if(&self, line: LinePoint, enough: impl Fn(&T) -> bool, sample: impl FnOnce() -> T) -> T {
-        let places = self.places.get_or_init(|| (0..PLACES).map(|_| Mutex::new(None)).collect());
-        let place = &places[place_of(&line)];
-        let lock = || place.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((known, output)) = &*lock()
-            && *known == line
-            && enough(output)
-        {
-            return output.clone();
-        }
-        let output = sample();
-        *lock() = Some((line, output.clone()));
+    /// The line's sample, if it is remembered.
+    pub fn get(&self, line: &LinePoint) -> Option<T> {
+        let place = self.place(line).lock().unwrap_or_else(PoisonError::into_inner);
+        place.as_ref().filter(|(known, _)| known == line).map(|(_, output)| output.clone())
+    }
+
+    /// Remembers a line's sample, and returns it.
+    pub fn put(&self, line: LinePoint, output: T) -> T {
+        *self.place(&line).lock().unwrap_or_else(PoisonError::into_inner) = Some((line, output.clone()));
         output
+    }
+
+    fn place(&self, line: &LinePoint) -> &Place<T> {
+        let places = self.places.get_or_init(|| (0..PLACES).map(|_| Mutex::new(None)).collect());
+        &places[place_of(line)]
     }
 }
 

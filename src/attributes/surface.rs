@@ -31,11 +31,12 @@ impl Seen {
         Self { class, depth: depth.get() as f32, normal: f32s(hit.normal) }
     }
 
-    /// The first hit of a line.
-    pub(super) fn along<R: Real>(lines: &SurfaceLines, line: LinePoint) -> Self {
+    /// The first hit of a line, and as it was found.
+    pub(super) fn along<R: Real>(lines: &SurfaceLines, line: LinePoint) -> (Self, Option<Hit<R>>) {
         let ray = lines.ray::<R>(line);
         let hit = lines.surface().hit(&ray, Reach::whole());
-        hit.map_or(Self::MISS, |hit| Self::of(&hit, lines.depth(hit.place(&ray), line.pair)))
+        let seen = |hit: Hit<R>| Self::of(&hit, lines.depth(hit.place(&ray), line.pair));
+        (hit.map_or(Self::MISS, seen), hit)
     }
 
     /// Whether the hit comes from the side that the normal points to.
@@ -90,7 +91,7 @@ impl<R: Real> Attribute for FirstHit<'_, R> {
     type Real = R;
 
     fn sample(&self, line: LinePoint) -> Seen {
-        self.memo.recall(line, || Seen::along::<R>(&self.lines, line))
+        self.memo.recall(line, || Seen::along::<R>(&self.lines, line).0)
     }
 
     fn class(&self, output: &Seen) -> u32 {

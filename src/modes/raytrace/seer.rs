@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::light_map::LightMap;
-use crate::attributes::exit_ray::{ExitRay, Through};
+use crate::attributes::exit_ray::{self, ExitRay};
 use crate::attributes::lines::SurfaceLines;
 use crate::attributes::memo::Memo;
 use crate::attributes::surface::{FirstHit, Seen, vector};
@@ -194,7 +194,7 @@ impl<'a, R: Real> Seer<'a, R> {
     pub fn table_bytes(&self) -> usize {
         let memo = match &self.tree {
             Some(Tree::Seen(_)) => Memo::<Seen>::BYTES,
-            Some(Tree::Through(_)) => Memo::<Through>::BYTES,
+            Some(Tree::Through(_)) => Memo::<exit_ray::Known<R>>::BYTES,
             None => 0,
         };
         memo + self.shadows.len() * LightMap::BYTES

@@ -4,10 +4,10 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::absorption::{Bodies, Lengths};
 use crate::error::Result;
 use crate::geometry::Real;
 use crate::modes::Control;
+use crate::modes::absorption::{Bodies, Lengths};
 use crate::modes::bench::LENGTHS;
 use crate::modes::bench::curve::views;
 use crate::modes::project::{Interpolation, Method, Projector, TreeSettings};
