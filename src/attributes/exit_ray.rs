@@ -102,11 +102,20 @@ impl<R: Real> Attribute for ExitRay<'_, R> {
             let (seen, hit) = Seen::along::<R>(&self.lines, line);
             (Through::outline(seen), hit)
         };
-        self.memo.recall(line, outline).0
+        Through::outline(self.memo.recall(line, outline).0.seen)
     }
 
     fn outline_class(&self, output: &Through) -> u32 {
         output.seen.class
+    }
+
+    /// A mirror's first hit has the normal that its rays are turned at.
+    fn outline_within(&self, output: &Through) -> Option<Through> {
+        (self.optics == Optics::Mirror).then(|| Through::outline(output.seen))
+    }
+
+    fn is_told_by_outline(&self, output: &Through) -> bool {
+        self.is_plain_mirror(output)
     }
 
     fn finish(&self, line: LinePoint, output: &mut Through) {
@@ -157,8 +166,11 @@ impl<R: Real> Attribute for ExitRay<'_, R> {
         Through { seen, way: first.way, exit_point: f32s(point), exit_dir: f32s(dir.normalized()) }
     }
 
-    /// Of the exit ray.
+    /// Of the exit ray; of a plain mirror, the normal, which is what is interpolated: lines of many slopes may share it.
     fn direction(&self, output: &Through) -> Option<Vec3<R>> {
+        if self.is_plain_mirror(output) {
+            return Some(vector(output.seen.normal));
+        }
         (output.exit_dir != [0.0; 3]).then(|| vector(output.exit_dir))
     }
 
@@ -186,8 +198,9 @@ impl<R: Real> ExitRay<'_, R> {
         self.memo.put(line, (Through { seen, way, exit_point, exit_dir }, Some(hit))).0
     }
 
+    /// Whether rays are turned once, at the first hit, as far as is known.
     fn is_plain_mirror(&self, output: &Through) -> bool {
-        self.optics == Optics::Mirror && output.turns() == 1
+        self.optics == Optics::Mirror && (output.turns() == 1 || !output.is_finished())
     }
 
     /// The exit ray of an interpolated output for the ray that asked, which meets the object at `place`.

@@ -163,7 +163,7 @@ const OFFSET_SCALE: f64 = 1.5;
 const SLOPE_SCALE: f64 = 0.75;
 
 /// No body counts as thinner than this share of its longest side: normals and exit rays may depend on the slope alone.
-const LEAST_FLATNESS: f64 = 1.0 / 16.0;
+const LEAST_FLATNESS: f64 = 1.0 / 4.0;
 
 /// The upper hull of (depth, across): the bound that lines are held against is the lesser of two linear ones, so that what
 /// holds at the hull's corners holds below it. Monotone chain, Andrew 1979, doi:10.1016/0020-0190(79)90072-3.

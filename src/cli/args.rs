@@ -14,7 +14,7 @@ use crate::physics::DetectorResponse;
 pub use audit::{AuditArgs, RayArgs};
 pub use bench::{BenchCommand, ChoiceArgs, CurveArgs, PaperArgs, RunArgs, ScaleArgs};
 pub use dose::{DoseArgs, FormatArg, TableArg};
-pub use trace::TraceArgs;
+pub use trace::{Application, TraceArgs};
 
 /// Exact intersection lengths of rays with organs: projection images of phantoms, with their numbers.
 ///

@@ -28,6 +28,17 @@ pub trait Attribute: Sync {
         self.class(output)
     }
 
+    /// The outline within an output, where outlines have [distances](Self::distance) and [directions](Self::direction) of their
+    /// own: corners are then finished for cells only that these leave whole.
+    fn outline_within(&self, _output: &Self::Output) -> Option<Self::Output> {
+        None
+    }
+
+    /// Whether a whole output's distances and directions are those of the [outline within](Self::outline_within).
+    fn is_told_by_outline(&self, _output: &Self::Output) -> bool {
+        false
+    }
+
     /// Makes the outline of a line its sample, unless it is.
     fn finish(&self, _line: LinePoint, _output: &mut Self::Output) {}
 

@@ -157,12 +157,7 @@ impl Place {
         if let Some(mixed) = mixed(corners, |c| attribute.outline_class(c), is_deepest) {
             return mixed;
         }
-        self.finish(attribute, corners);
-        if let Some(mixed) = mixed(corners, |c| attribute.class(c), is_deepest) {
-            return mixed;
-        }
-        let class = attribute.class(&corners[0]);
-        if attribute.is_miss(class) {
+        if attribute.is_miss(attribute.outline_class(&corners[0])) {
             return if attribute.is_certainly_empty(self.pair, &self.cell) {
                 Verdict::Final(Kind::Empty)
             } else if is_deepest {
@@ -171,31 +166,49 @@ impl Place {
                 Verdict::Split
             };
         }
-        // Smaller cells hold directions nearer to each other.
-        let is_wide = spread_exceeds(attribute, corners.iter(), parameters.angular_threshold_deg);
-        if is_deepest {
-            return Verdict::Final(if is_wide { Kind::Traced(Reason::Angle) } else { Kind::Smooth });
+        if attribute.outline_within(&corners[0]).is_some() {
+            let outlines =
+                corners.each_ref().map(|c| attribute.outline_within(c).unwrap_or_else(|| c.clone()));
+            let by_outlines =
+                self.smoothness(attribute, &outlines, parameters, |line| attribute.outline(line));
+            if by_outlines != Verdict::Final(Kind::Smooth) {
+                return by_outlines;
+            }
         }
-        if is_wide || !self.middle_is_near(attribute, corners, class, parameters.distance_threshold) {
-            return Verdict::Split;
+        self.finish(attribute, corners);
+        if let Some(mixed) = mixed(corners, |c| attribute.class(c), is_deepest) {
+            return mixed;
         }
-        Verdict::Final(Kind::Smooth)
+        if attribute.is_told_by_outline(&corners[0]) {
+            return Verdict::Final(Kind::Smooth);
+        }
+        self.smoothness(attribute, corners, parameters, |line| attribute.sample(line))
     }
 
-    /// The midpoint test: interpolated against exact at the cell's centre.
-    fn middle_is_near<A: Attribute>(
+    /// What is to be done with a cell of one class by how near to each other its corners are, and by the midpoint test:
+    /// interpolated against exact at the cell's centre.
+    fn smoothness<A: Attribute>(
         &self,
         attribute: &A,
         corners: &Corners<A::Output>,
-        class: u32,
-        threshold: f64,
-    ) -> bool {
-        let exact = attribute.sample(self.line(self.cell.centre()));
-        if attribute.class(&exact) != class {
-            return false;
+        parameters: &Parameters,
+        exact: impl FnOnce(LinePoint) -> A::Output,
+    ) -> Verdict {
+        // Smaller cells hold directions nearer to each other.
+        let is_wide = spread_exceeds(attribute, corners.iter(), parameters.angular_threshold_deg);
+        if self.is_deepest(parameters) {
+            return Verdict::Final(if is_wide { Kind::Traced(Reason::Angle) } else { Kind::Smooth });
         }
-        let near = attribute.distance(&quadrilinear(attribute, corners, [A::Real::of(0.5); 4]), &exact);
-        near <= threshold
+        if is_wide {
+            return Verdict::Split;
+        }
+        let exact = exact(self.line(self.cell.centre()));
+        let is_near = || {
+            let middle = quadrilinear(attribute, corners, [A::Real::of(0.5); 4]);
+            attribute.distance(&middle, &exact) <= parameters.distance_threshold
+        };
+        let is_of_class = attribute.class(&exact) == attribute.class(&corners[0]);
+        if is_of_class && is_near() { Verdict::Final(Kind::Smooth) } else { Verdict::Split }
     }
 
     /// The interpolated output of a line of a cell of two classes, or why it is traced.

@@ -4,8 +4,8 @@
 //!        light            A place is hidden if the light's ray meets the object nearer than the place. All such rays pass
 //!          ☼              through one point, so that two coordinates tell them: a lattice of rays over the object's box
 //!         ╱│╲             knows how far they go, and in a cell whose corners and middle fit together the rays between are
-//!        ╱ │ ╲            interpolated. Inverse depths are: of a plane they are linear. Everywhere else, along outlines and
-//!       ╱ ▁▂▃ ╲           folds, the light's ray is traced.
+//!        ╱ │ ╲            interpolated. Inverse depths are: of a plane they are linear. Along outlines and folds the light's
+//!       ╱ ▁▂▃ ╲           ray is traced, unless the rays around all meet the object on one side of the place.
 //!      ────●────  place
 //! ```
 //!
@@ -21,7 +21,7 @@ use crate::geometry::{Ray, Real, Vec3};
 use crate::surface::{Reach, Surface};
 
 /// Cells of the lattice along each side.
-const SIDE: usize = 64;
+const SIDE: usize = 96;
 
 /// A place is not hidden by what lies before it by less than this share of the object's longest side: trees tell an object's
 /// own places no better.
@@ -138,22 +138,26 @@ impl Lattice {
             R::of(sample.known(|| self.sample::<R>(map, [column as f64, row as f64])))
         };
         let corners: [R; 4] = std::array::from_fn(corner);
-        if corners.iter().any(|c| c.get() == 0.0) {
-            return None;
-        }
         let middle = table.middles[cell[1] * SIDE + cell[0]]
             .known(|| self.sample::<R>(map, cell.map(|x| x as f64 + 0.5)));
         // d(1/z) = −dz/z²: a length along the axis.
         let as_length = depth * depth;
+        let before = |met: R| match met.get() {
+            0.0 => f64::NEG_INFINITY,
+            _ => ((met - inverse) * as_length).get(),
+        };
+        if corners.iter().any(|c| c.get() == 0.0) {
+            return agreed(corners.map(before), before(R::of(middle)), map.slack);
+        }
         let mean = (corners[0] + corners[1] + corners[2] + corners[3]) * R::of(0.25);
         if ((mean - R::of(middle)).abs() * as_length).get() > 0.5 * map.slack {
-            return None;
+            return agreed(corners.map(before), before(R::of(middle)), map.slack);
         }
         let within: [R; 2] = std::array::from_fn(|i| at[i] - R::of(cell[i] as f64));
         let mix = |a: R, b: R, share: R| a + (b - a) * share;
         let met =
             mix(mix(corners[0], corners[1], within[0]), mix(corners[2], corners[3], within[0]), within[1]);
-        let before = ((met - inverse) * as_length).get();
+        let before = before(met);
         // Where the interpolated depth may be off by what decides, it does not.
         let is_doubtful = (0.5 * map.slack..2.0 * map.slack).contains(&before);
         (!is_doubtful).then_some(before > map.slack)
@@ -193,6 +197,18 @@ impl Lattice {
         }
         Table { corners: samples((SIDE + 1) * (SIDE + 1)), middles: samples(SIDE * SIDE), may_be_met }
     }
+}
+
+/// What the rays around one say together, where they are not interpolated: whether all meet the surface before the place, or
+/// none does, by more than the slack. A ray that misses meets it infinitely far behind.
+fn agreed(corners: [f64; 4], middle: f64, slack: f64) -> Option<bool> {
+    // Where all miss something small may lie between.
+    let is_met = corners.into_iter().chain([middle]).any(|before| before > f64::NEG_INFINITY);
+    let all = |is_so: fn(f64, f64) -> bool| is_so(middle, slack) && corners.iter().all(|&b| is_so(b, slack));
+    if all(|before, slack| before > 2.0 * slack) {
+        return Some(true);
+    }
+    (is_met && all(|before, slack| before < -slack)).then_some(false)
 }
 
 /// The slopes to the axis of the way to a place. `None` unless it lies before the light.
