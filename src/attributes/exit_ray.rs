@@ -4,7 +4,7 @@ use std::marker::PhantomData;
 
 use super::lines::SurfaceLines;
 use super::memo::Memo;
-use super::surface::{Seen, blend, distance, f32s, vector};
+use super::surface::{LEVELS_SPARED, Seen, blend, distance, f32s, vector};
 use crate::geometry::{Ray, Real, Vec3};
 use crate::linespace::{Cell, LinePoint, PlanePair};
 use crate::ritree::Attribute;
@@ -53,6 +53,9 @@ impl Through {
         leaves.then(|| Ray { origin: vector(self.exit_point), dir: vector(self.exit_dir) })
     }
 }
+
+/// As [`LEVELS_SPARED`]. Samples of glass cost the most, and many of its discontinuities lie within its outline.
+const GLASS_LEVELS_SPARED: u32 = 4;
 
 /// How far along a ray a hit may lie from where its depth says, box units: depths of up to 1 are rounded to f32 along the
 /// axis, and rays are at most √3 times as long.
@@ -107,6 +110,13 @@ impl<R: Real> Attribute for ExitRay<'_, R> {
 
     fn outline_class(&self, output: &Through) -> u32 {
         output.seen.class
+    }
+
+    fn levels_spared(&self) -> u32 {
+        match self.optics {
+            Optics::Mirror => LEVELS_SPARED,
+            Optics::Glass { .. } => GLASS_LEVELS_SPARED,
+        }
     }
 
     /// A mirror's first hit has the normal that its rays are turned at.

@@ -24,13 +24,23 @@ pub struct SurfaceLines<'a> {
     rims: [[Rim; 8]; 3],
 }
 
+/// How much of what is known of a line changes with its direction, where it meets the same place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ByDirection {
+    /// Little: normals are those of places.
+    Little,
+    /// Much: rays that are refracted leave by it.
+    Much,
+}
+
 /// What of a hull is farthest across, at any depth: (depth, across) from the middle, box units. Lines that run beyond all of
 /// these run beyond the hull.
 type Rim = Vec<DVec2>;
 
 impl<'a> SurfaceLines<'a> {
-    /// `None` if the surface has no extent.
-    pub fn new(surface: &'a Surface) -> Option<Self> {
+    /// For outputs that change with the place that a line meets, and with its direction as `by_direction` says. `None` if the
+    /// surface has no extent.
+    pub fn new(surface: &'a Surface, by_direction: ByDirection) -> Option<Self> {
         let bounds = surface.bounds();
         // The cube of the longest side, with room for the rounding of depths, which are told in its unit: planes as near to
         // each other as a sheet is thick would tell directions no finer than 30° at the greatest depth.
@@ -40,7 +50,10 @@ impl<'a> SurfaceLines<'a> {
         let points = surface.hull_points();
         let hull = convex_hull(&points).map_or(points, |mesh| mesh.vertices);
         let side = bounds.size().max_element();
-        let slope_scales = (bounds.size() / side).max(DVec3::splat(LEAST_FLATNESS)) * SLOPE_SCALE;
+        let slope_scales = match by_direction {
+            ByDirection::Little => (bounds.size() / side).max(DVec3::splat(LEAST_FLATNESS)) * SLOPE_SCALE,
+            ByDirection::Much => DVec3::splat(2.0 * SLOPE_SCALE),
+        };
         let rims = [0, 1, 2].map(|k| {
             let (i, j) = ((k + 1) % 3, (k + 2) % 3);
             let of = |p: &DVec3| (*p - middle) / space.size()[k];
@@ -159,7 +172,7 @@ const OFFSET_SCALE: f64 = 1.5;
 
 /// Slopes are at most 1, and take half the range: what a camera's rays meet changes less with the slope than with the place.
 /// Of a body that is flat along the lines' axis they take as much less as it is thin: it is met near the middle, where lines of
-/// any slope are in their places.
+/// any slope are in their places. Where outputs change much with the direction they take all of it.
 const SLOPE_SCALE: f64 = 0.75;
 
 /// No body counts as thinner than this share of its longest side: normals and exit rays may depend on the slope alone.
@@ -197,7 +210,7 @@ mod tests {
     #[test]
     fn lines_come_back_from_their_points_and_cells_called_empty_hold_none_that_hits() {
         let surface = Surface::Sphere(Sphere::new(DVec3::new(30.0, -4.0, 7.0), 12.0).expect("a sphere"));
-        let lines = SurfaceLines::new(&surface).expect("an extent");
+        let lines = SurfaceLines::new(&surface, ByDirection::Little).expect("an extent");
         let mut rng = rand_pcg::Pcg64::seed_from_u64(5);
         let (mut empty, mut hits) = (0, 0);
         for i in 0..3_000 {

@@ -60,6 +60,9 @@ pub(super) fn blend<'a, R: Real>(parts: impl Iterator<Item = (R, &'a [f32; 3])>)
     parts.fold(Vec3::default(), |sum, (weight, v)| sum + vector(*v) * weight)
 }
 
+/// See [`Attribute::levels_spared`]: cells along outlines that are twice to four times as large, in the paper's pictures.
+pub(super) const LEVELS_SPARED: u32 = 2;
+
 /// How far two hits of one line are apart, box units, where a turn of the normal counts `leverage` times.
 pub(super) fn distance<R: Real>(a: &Seen, b: &Seen, leverage: f64) -> f64 {
     let turned = (vector::<R>(a.normal) - vector(b.normal)) * R::of(leverage);
@@ -92,6 +95,10 @@ impl<R: Real> Attribute for FirstHit<'_, R> {
 
     fn sample(&self, line: LinePoint) -> Seen {
         self.memo.recall(line, || Seen::along::<R>(&self.lines, line).0)
+    }
+
+    fn levels_spared(&self) -> u32 {
+        LEVELS_SPARED
     }
 
     fn class(&self, output: &Seen) -> u32 {

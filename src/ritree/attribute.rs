@@ -28,6 +28,12 @@ pub trait Attribute: Sync {
         self.class(output)
     }
 
+    /// How many levels before the greatest depth cells end that hold a discontinuity, or all of whose corners miss: their lines
+    /// are traced, and where few lines ask for a cell that is less than to sample it. 0 is the paper's rule.
+    fn levels_spared(&self) -> u32 {
+        0
+    }
+
     /// The outline within an output, where outlines have [distances](Self::distance) and [directions](Self::direction) of their
     /// own: corners are then finished for cells only that these leave whole.
     fn outline_within(&self, _output: &Self::Output) -> Option<Self::Output> {

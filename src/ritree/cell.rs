@@ -153,7 +153,8 @@ impl Place {
         corners: &mut Corners<A::Output>,
         parameters: &Parameters,
     ) -> Verdict {
-        let is_deepest = self.is_deepest(parameters);
+        let is_deepest = self.depth.saturating_add(attribute.levels_spared()) >= parameters.max_depth
+            || self.is_deepest(parameters);
         if let Some(mixed) = mixed(corners, |c| attribute.outline_class(c), is_deepest) {
             return mixed;
         }

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::light_map::LightMap;
 use crate::attributes::exit_ray::{self, ExitRay};
-use crate::attributes::lines::SurfaceLines;
+use crate::attributes::lines::{ByDirection, SurfaceLines};
 use crate::attributes::memo::Memo;
 use crate::attributes::surface::{FirstHit, Seen, vector};
 use crate::geometry::{Bounds, Ray, Real, Vec3};
@@ -72,7 +72,11 @@ impl<'a, R: Real> Seer<'a, R> {
         let lights: Vec<DVec3> = world.lights.iter().map(|light| light.position).collect();
         let (optics, limit) = (object.material.optics(), world.most_inner_turns);
         let grow = |parameters| {
-            let lines = SurfaceLines::new(&object.surface)?;
+            let by_direction = match optics {
+                Some(Optics::Glass { .. }) => ByDirection::Much,
+                Some(Optics::Mirror) | None => ByDirection::Little,
+            };
+            let lines = SurfaceLines::new(&object.surface, by_direction)?;
             Some(match optics {
                 None => Tree::Seen(RiTree::new(FirstHit::new(lines), parameters)),
                 Some(optics) => Tree::Through(RiTree::new(ExitRay::new(lines, optics, limit), parameters)),
