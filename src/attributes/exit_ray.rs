@@ -4,7 +4,7 @@ use std::marker::PhantomData;
 
 use super::lines::SurfaceLines;
 use super::memo::Memo;
-use super::surface::{LEVELS_SPARED, Seen, blend, distance, f32s, vector};
+use super::surface::{LEVELS_SPARED, SECOND_LOOK, Seen, blend, distance, f32s, vector};
 use crate::geometry::{Ray, Real, Vec3};
 use crate::linespace::{Cell, LinePoint, PlanePair};
 use crate::ritree::Attribute;
@@ -182,6 +182,15 @@ impl<R: Real> Attribute for ExitRay<'_, R> {
             return Some(vector(output.seen.normal));
         }
         (output.exit_dir != [0.0; 3]).then(|| vector(output.exit_dir))
+    }
+
+    /// A mirrored ray turns twice as far as the normal.
+    fn angular_share(&self) -> f64 {
+        if self.optics == Optics::Mirror { 0.5 } else { 1.0 }
+    }
+
+    fn second_look(&self) -> Option<[f64; 4]> {
+        Some(SECOND_LOOK)
     }
 
     fn is_certainly_empty(&self, pair: PlanePair, cell: &Cell) -> bool {

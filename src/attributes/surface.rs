@@ -63,6 +63,9 @@ pub(super) fn blend<'a, R: Real>(parts: impl Iterator<Item = (R, &'a [f32; 3])>)
 /// See [`Attribute::levels_spared`]: cells along outlines that are twice to four times as large, in the paper's pictures.
 pub(super) const LEVELS_SPARED: u32 = 2;
 
+/// See [`Attribute::second_look`]: off the middle along every side, differently far.
+pub(super) const SECOND_LOOK: [f64; 4] = [0.2, 0.6, 0.45, 0.35];
+
 /// How far two hits of one line are apart, box units, where a turn of the normal counts `leverage` times.
 pub(super) fn distance<R: Real>(a: &Seen, b: &Seen, leverage: f64) -> f64 {
     let turned = (vector::<R>(a.normal) - vector(b.normal)) * R::of(leverage);
@@ -124,6 +127,10 @@ impl<R: Real> Attribute for FirstHit<'_, R> {
 
     fn direction(&self, output: &Seen) -> Option<Vec3<R>> {
         (output.class != Seen::MISS.class).then(|| vector(output.normal))
+    }
+
+    fn second_look(&self) -> Option<[f64; 4]> {
+        Some(SECOND_LOOK)
     }
 
     fn is_certainly_empty(&self, pair: PlanePair, cell: &Cell) -> bool {

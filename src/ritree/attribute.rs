@@ -73,6 +73,17 @@ pub trait Attribute: Sync {
         None
     }
 
+    /// What of the angular threshold directions may differ by: less than all of it where what is told turns farther than they do.
+    fn angular_share(&self) -> f64 {
+        1.0
+    }
+
+    /// Where in a cell, from 0 to 1 along each side, a second line must pass the midpoint's test. Of what bends one way along one
+    /// side and the other way along another the midpoint knows nothing. `None` is the paper's rule.
+    fn second_look(&self) -> Option<[f64; 4]> {
+        None
+    }
+
     /// Whether a line and its reverse have the same output, so that +X and −X can share a tree.
     fn is_symmetric(&self) -> bool {
         false

@@ -193,7 +193,7 @@ impl Place {
         attribute: &A,
         corners: &Corners<A::Output>,
         parameters: &Parameters,
-        exact: impl FnOnce(LinePoint) -> A::Output,
+        exact: impl Fn(LinePoint) -> A::Output,
     ) -> Verdict {
         // Smaller cells hold directions nearer to each other.
         let is_wide = spread_exceeds(attribute, corners.iter(), parameters.angular_threshold_deg);
@@ -203,13 +203,15 @@ impl Place {
         if is_wide {
             return Verdict::Split;
         }
-        let exact = exact(self.line(self.cell.centre()));
-        let is_near = || {
-            let middle = quadrilinear(attribute, corners, [A::Real::of(0.5); 4]);
-            attribute.distance(&middle, &exact) <= parameters.distance_threshold
+        let class = attribute.class(&corners[0]);
+        let is_near = |at: [f64; 4]| {
+            let exact = exact(self.line(self.cell.at(at)));
+            let near = || quadrilinear(attribute, corners, at.map(A::Real::of));
+            attribute.class(&exact) == class
+                && attribute.distance(&near(), &exact) <= parameters.distance_threshold
         };
-        let is_of_class = attribute.class(&exact) == attribute.class(&corners[0]);
-        if is_of_class && is_near() { Verdict::Final(Kind::Smooth) } else { Verdict::Split }
+        let is_smooth = is_near([0.5; 4]) && attribute.second_look().is_none_or(is_near);
+        if is_smooth { Verdict::Final(Kind::Smooth) } else { Verdict::Split }
     }
 
     /// The interpolated output of a line of a cell of two classes, or why it is traced.
@@ -286,6 +288,6 @@ where
     A::Output: 'a,
 {
     let directions: Vec<_> = outputs.filter_map(|o| attribute.direction(o)).collect();
-    let least_cosine = A::Real::of(threshold_deg.to_radians().cos());
+    let least_cosine = A::Real::of((attribute.angular_share() * threshold_deg).to_radians().cos());
     directions.iter().enumerate().any(|(i, a)| directions[..i].iter().any(|b| a.dot(*b) < least_cosine))
 }

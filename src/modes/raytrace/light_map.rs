@@ -23,16 +23,23 @@ use crate::surface::{Reach, Surface};
 /// Cells of the lattice along each side.
 const SIDE: usize = 96;
 
-/// A place is not hidden by what lies before it by less than this share of the object's longest side: trees tell an object's
-/// own places no better.
+/// A place of another object is not hidden by what lies before it by less than this share of the object's longest side.
 const SLACK: f64 = 0.01;
+
+/// Nor is a place of the object itself by what lies before it by less than this share of how far its tree may put it off.
+const OWN_SLACK: f64 = 0.2;
+
+/// A place that is off across the surface is off along a light by as much over the cosine between them; but places that
+/// the light grazes have little of it.
+const LEAST_COSINE: f64 = 0.1;
 
 /// An object before one light.
 pub struct LightMap<'a> {
     surface: &'a Surface,
     light: DVec3,
-    /// See [`SLACK`], as a length.
+    /// See [`SLACK`] and [`OWN_SLACK`], as lengths.
     slack: f64,
+    own_slack: f64,
     /// `None` if the object is so near to the light that no plane shows all of it.
     lattice: Option<Lattice>,
 }
@@ -71,27 +78,42 @@ impl<'a> LightMap<'a> {
     /// Bytes that a map holds once it is used.
     pub const BYTES: usize = ((SIDE + 1) * (SIDE + 1) + SIDE * SIDE) * size_of::<Sample>() + SIDE * SIDE;
 
-    /// The map of a surface before a light.
-    pub fn new(surface: &'a Surface, light: DVec3) -> Self {
+    /// The map of a surface before a light. The object's own places are off by `threshold` box units at most.
+    pub fn new(surface: &'a Surface, light: DVec3, threshold: f64) -> Self {
         let bounds = surface.bounds();
-        let slack = SLACK * bounds.size().max_element();
-        Self { surface, light, slack, lattice: Lattice::new(&bounds.corners(), bounds.centre() - light) }
-    }
-
-    /// Whether the surface hides the light from a place.
-    pub fn hides<R: Real>(&self, place: Vec3<R>) -> bool {
-        let way = place - Vec3::of(self.light);
-        match &self.lattice {
-            None => self.is_met_before(way),
-            Some(lattice) => lattice.hides(way, self).unwrap_or_else(|| self.is_met_before(way)),
+        let side = bounds.size().max_element();
+        let slack = SLACK * side;
+        let own_slack = (OWN_SLACK * threshold * side).max(slack);
+        Self {
+            surface,
+            light,
+            slack,
+            own_slack,
+            lattice: Lattice::new(&bounds.corners(), bounds.centre() - light),
         }
     }
 
-    /// Whether the light's ray meets the surface before a place that lies `way` from it.
-    fn is_met_before<R: Real>(&self, way: Vec3<R>) -> bool {
+    /// Whether the surface hides the light from a place of another one.
+    pub fn hides<R: Real>(&self, place: Vec3<R>) -> bool {
+        self.hides_by(place, self.slack)
+    }
+
+    /// Whether it hides the light from a place of its own, which faces the light at this cosine.
+    pub fn hides_itself<R: Real>(&self, place: Vec3<R>, cosine: R) -> bool {
+        self.hides_by(place, self.own_slack / cosine.get().max(LEAST_COSINE))
+    }
+
+    fn hides_by<R: Real>(&self, place: Vec3<R>, slack: f64) -> bool {
+        let way = place - Vec3::of(self.light);
+        let known = self.lattice.as_ref().and_then(|lattice| lattice.hides(way, slack, self));
+        known.unwrap_or_else(|| self.is_met_before(way, slack))
+    }
+
+    /// Whether the light's ray meets the surface by more than the slack before a place that lies `way` from it.
+    fn is_met_before<R: Real>(&self, way: Vec3<R>, slack: f64) -> bool {
         let far = way.length();
         let ray = Ray { origin: Vec3::of(self.light), dir: way * (R::of(1.0) / far) };
-        self.surface.is_met(&ray, Reach { to: far - R::of(self.slack), ..Reach::whole() })
+        self.surface.is_met(&ray, Reach { to: far - R::of(slack), ..Reach::whole() })
     }
 }
 
@@ -112,7 +134,7 @@ impl Lattice {
     }
 
     /// Whether a place that lies `way` from the light is hidden. `None` if that must be traced.
-    fn hides<R: Real>(&self, way: Vec3<R>, map: &LightMap) -> Option<bool> {
+    fn hides<R: Real>(&self, way: Vec3<R>, slack: f64, map: &LightMap) -> Option<bool> {
         let depth = way.dot(Vec3::of(self.axis));
         if depth.get() <= 0.0 {
             // All of the object is on the other side.
@@ -146,12 +168,13 @@ impl Lattice {
             0.0 => f64::NEG_INFINITY,
             _ => ((met - inverse) * as_length).get(),
         };
+        let by_agreement = || agreed(corners.map(before), before(R::of(middle)), slack);
         if corners.iter().any(|c| c.get() == 0.0) {
-            return agreed(corners.map(before), before(R::of(middle)), map.slack);
+            return by_agreement();
         }
         let mean = (corners[0] + corners[1] + corners[2] + corners[3]) * R::of(0.25);
         if ((mean - R::of(middle)).abs() * as_length).get() > 0.5 * map.slack {
-            return agreed(corners.map(before), before(R::of(middle)), map.slack);
+            return by_agreement();
         }
         let within: [R; 2] = std::array::from_fn(|i| at[i] - R::of(cell[i] as f64));
         let mix = |a: R, b: R, share: R| a + (b - a) * share;
@@ -159,8 +182,8 @@ impl Lattice {
             mix(mix(corners[0], corners[1], within[0]), mix(corners[2], corners[3], within[0]), within[1]);
         let before = before(met);
         // Where the interpolated depth may be off by what decides, it does not.
-        let is_doubtful = (0.5 * map.slack..2.0 * map.slack).contains(&before);
-        (!is_doubtful).then_some(before > map.slack)
+        let is_doubtful = (before - slack).abs() < 0.5 * map.slack;
+        (!is_doubtful).then_some(before > slack)
     }
 
     /// The inverse depth at which the light's ray through a point of the lattice first meets the surface; 0 if it does not.

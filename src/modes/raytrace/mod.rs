@@ -318,7 +318,7 @@ impl<R: Real> LightPath<'_, '_, R> {
             let far = way.length();
             let dir = way * (R::of(1.0) / far);
             let cosine = dir.dot(sight.normal);
-            if cosine.get() <= 0.0 || self.seers[object].hides_itself(light_index, ray, sight) {
+            if cosine.get() <= 0.0 || self.seers[object].hides_itself(light_index, ray, sight, cosine) {
                 continue;
             }
             let reaching = self.visibility(object, light_index, &Ray { origin: sight.place, dir }, far);

@@ -83,7 +83,8 @@ impl<'a, R: Real> Seer<'a, R> {
             })
         };
         let tree = parameters.filter(|_| object.grows).and_then(grow);
-        let map = |&light: &DVec3| LightMap::new(&object.surface, light);
+        let threshold = parameters.map_or(0.0, |p| p.distance_threshold);
+        let map = |&light: &DVec3| LightMap::new(&object.surface, light, threshold);
         let shadows = if tree.is_some() { lights.iter().map(map).collect() } else { Vec::new() };
         let bounds = object.surface.bounds();
         Self { object, bounds, shadows, lights, optics, limit, tree }
@@ -115,14 +116,14 @@ impl<'a, R: Real> Seer<'a, R> {
         }
     }
 
-    /// Whether it hides a light from a place of its own, seen along `ray` on the side that the light is on.
-    pub fn hides_itself(&self, light: usize, ray: &Ray<R>, sight: &Sight<R>) -> bool {
+    /// Whether it hides a light from a place of its own, seen along `ray`, which faces the light at this cosine.
+    pub fn hides_itself(&self, light: usize, ray: &Ray<R>, sight: &Sight<R>, cosine: R) -> bool {
         // Convex surfaces hide no place of theirs that faces the light.
         if self.object.is_convex {
             return false;
         }
         match (self.shadows.get(light), sight.known) {
-            (Some(map), _) => map.hides(sight.place),
+            (Some(map), _) => map.hides_itself(sight.place, cosine),
             (None, Known::Traced(hit)) => self.is_met_again(ray, &hit, self.lights[light]),
             (None, Known::Told(_)) => false,
         }
