@@ -252,3 +252,54 @@ impl Sample {
         traced
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+    use crate::scene::trace::{Recipe, open};
+
+    #[test]
+    fn maps_say_of_places_what_tracing_them_says() {
+        let recipe = Recipe { seed: 2, count: 3 };
+        let worlds = ["tomatoes", "random-volumes"].map(|name| open(name, recipe).expect("a world"));
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(11);
+        let (mut places, mut hidden, mut known, mut wrong) = (0, 0, 0, 0);
+        for (world, object) in worlds.iter().flat_map(|w| w.objects.iter().map(move |o| (w, o))) {
+            let map = LightMap::new(&object.surface, world.lights[0].position, 0.05);
+            let Some(lattice) = &map.lattice else { continue };
+            let bounds = object.surface.bounds().grown(20.0);
+            for _ in 0..400 {
+                let within = DVec3::from([(); 3].map(|()| rng.random_range(0.0..1.0)));
+                let place = bounds.min + within * bounds.size();
+                let way = place - map.light;
+                let truth = map.is_met_before(Vec3::<f64>::of(way), map.slack);
+                assert_eq!(map.hides(Vec3::<f64>::of(place)), map.hides(Vec3::<f64>::of(place)));
+                let told = lattice.hides(Vec3::<f64>::of(way), map.slack, &map);
+                places += 1;
+                hidden += u32::from(truth);
+                known += u32::from(told.is_some());
+                wrong += u32::from(told.is_some_and(|told| told != truth));
+            }
+        }
+        // Rays between those of the lattice may graze what they do not.
+        assert!(hidden > places / 10 && known > places / 2, "{hidden}, {known} of {places}");
+        assert!(wrong * 200 < known, "{wrong} of {known} known");
+    }
+
+    #[test]
+    fn behind_the_light_and_beside_the_object_nothing_is_hidden() {
+        let world = open("random-volumes", Recipe { seed: 2, count: 1 }).expect("a world");
+        let surface = &world.objects[0].surface;
+        let light = surface.bounds().centre() + DVec3::new(0.0, 0.0, 900.0);
+        let map = LightMap::new(surface, light, 0.05);
+        let hides = |off: DVec3| map.hides(Vec3::<f64>::of(surface.bounds().centre() + off));
+        assert!(hides(DVec3::new(0.0, 0.0, -300.0)));
+        assert!(!hides(DVec3::new(0.0, 0.0, 300.0)) && !hides(DVec3::new(0.0, 0.0, 1200.0)));
+        assert!(!hides(DVec3::new(400.0, 0.0, -300.0)));
+        // So near that no plane shows all of the object, every ray is traced.
+        let near = LightMap::new(surface, surface.bounds().centre(), 0.05);
+        assert!(near.lattice.is_none() && near.hides(Vec3::<f64>::of(light)));
+    }
+}
