@@ -5,7 +5,7 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use crate::linespace::LinePoint;
 
 /// The samples remembered, at most: less than a megabyte of exit rays, made when the first line is sampled. They stand beside
-/// the cache of nodes: its limit may not change answers' cost by so much, and they do not grow.
+/// the cache of nodes, and do not grow.
 const PLACES: usize = 1 << 12;
 
 type Place<T> = Mutex<Option<(LinePoint, T)>>;
