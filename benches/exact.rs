@@ -2,10 +2,10 @@
 //! the table, which runs them in turns.
 
 use std::hint::black_box;
-use std::time::Duration;
 
 use common::body::{Ellipsoid, SUBDIVISIONS};
 use common::rays::RaySet;
+use common::samples::few_samples;
 use common::{field, random, view};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 
@@ -58,14 +58,6 @@ fn building(criterion: &mut Criterion) {
         }
     }
     group.finish();
-}
-
-/// Ten samples of each: an iteration is a whole image.
-fn few_samples() -> Criterion {
-    Criterion::default()
-        .sample_size(10)
-        .warm_up_time(Duration::from_millis(500))
-        .measurement_time(Duration::from_secs(2))
 }
 
 criterion_group! {

@@ -2,7 +2,6 @@
 //! by itself. The engines that sample for them are in `exact`, whole trees in `trees`.
 
 use std::hint::black_box;
-use std::time::Duration;
 
 use chordfield::attributes::chord::ChordLength;
 use chordfield::attributes::squared_chord::{ImageChords, SquaredChord};
@@ -11,6 +10,7 @@ use chordfield::geometry::RayGrid;
 use chordfield::linespace::{LinePoint, PlanePair};
 use chordfield::ritree::{Attribute, Cache, Fit, FittedTree, Parameters, Place, RiTree};
 use common::body::Ellipsoid;
+use common::samples::few_samples;
 use common::{random, view};
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 
@@ -173,14 +173,6 @@ fn traced(criterion: &mut Criterion) {
         });
     });
     group.finish();
-}
-
-/// Few samples: an iteration is thousands of lines.
-fn few_samples() -> Criterion {
-    Criterion::default()
-        .sample_size(10)
-        .warm_up_time(Duration::from_millis(500))
-        .measurement_time(Duration::from_secs(2))
 }
 
 criterion_group! {

@@ -7,7 +7,7 @@
 //! Making ready for a view is part of its times. What a body needs once (for this crate's engines with all proofs that it is
 //! closed, or convex) is its build.
 //!
-//! `cargo bench --bench table -- [--quick] [1280] [20480] [327680] [organs] [600] [2048] [random]`
+//! `cargo bench --bench table -- [--quick] [1280] [20480] [327680] [organs] [600] [2048] [random] [raster] [obvhs] …`
 //!
 //! `cargo bench --bench table -- choice` prints instead, on one thread, whether the engine taken unasked is the quickest.
 
@@ -27,6 +27,9 @@ use common::{Contestant, Entrant, YARDSTICK, field, machine, random, view};
 /// The bodies by their faces, and the picture of many.
 const SCENES: [&str; 4] = ["1280", "20480", "327680", "organs"];
 
+/// Who may enter.
+const NAMES: [&str; 6] = ["clip", "bvh", "walk", "raster", YARDSTICK, "parry3d"];
+
 /// Images by their side, and the batch.
 const RAY_SETS: [&str; 3] = ["600", "2048", "random"];
 
@@ -36,7 +39,7 @@ const MOST_OVER_BEST: f64 = 1.3;
 /// What to run, from the command line.
 struct Options {
     quick: bool,
-    /// Scenes and sets of rays by name; all scenes if no scene is named, all sets if no set is.
+    /// Scenes, sets of rays and entrants by name; all scenes if no scene is named, and so on.
     only: Vec<String>,
 }
 
@@ -51,6 +54,11 @@ impl Options {
     fn wants(&self, member: &str, group: &[&str]) -> bool {
         let named = |name: &str| self.only.iter().any(|only| only == name);
         named(member) || !group.iter().any(|name| named(name))
+    }
+
+    /// Those who enter for a body of so many faces.
+    fn field(&self, faces: usize) -> Vec<Entrant> {
+        field(faces).into_iter().filter(|entrant| self.wants(entrant.name, &NAMES)).collect()
     }
 
     fn rounds(&self) -> usize {
@@ -93,7 +101,7 @@ fn print_tables(options: &Options) -> Result<bool> {
         let faces = 20 * 4usize.pow(subdivisions);
         assert_eq!(scene, faces.to_string());
         if options.wants(scene, &SCENES) {
-            sound &= print_body(options, &field(faces), subdivisions, faces)?;
+            sound &= print_body(options, &options.field(faces), subdivisions, faces)?;
         }
     }
     if options.wants("organs", &SCENES) {
@@ -164,7 +172,7 @@ fn print_organs(options: &Options) -> Result<bool> {
     let size = if options.quick { 300 } else { 600 };
     let organs = Organs::new(size);
     let (count, faces) = (organs.surfaces.len(), organs.surfaces[0].mesh().faces.len());
-    let entrants = field(faces);
+    let entrants = options.field(faces);
     let figures = race_of_organs(&entrants, &organs, options.rounds());
 
     let out = &mut stdout().lock();

@@ -333,9 +333,8 @@ fn random_rays(out: &mut impl Write, body: &Body, count: usize, tolerances_mm: &
                 open_rays.clear();
                 let lines = rays.iter().map(Segment::line).enumerate();
                 SquaredChord::ask_all(&tree, lines, &cache, |i, line, asked| {
-                    let known = asked.map_or(Known::Miss, |(leaf, pair, stuv)| {
-                        tree.fit().known(leaf, line, pair, stuv)
-                    });
+                    let known = asked
+                        .map_or(Known::Miss, |(leaf, pair, stuv)| tree.fit().known(leaf, line, pair, stuv));
                     match known {
                         Known::Miss => lengths[i] = 0.0,
                         Known::Length(length) => lengths[i] = length,

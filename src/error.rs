@@ -78,7 +78,8 @@ pub struct SceneError {
 impl Error {
     /// A wrong input: who, what, and what to do.
     pub fn input(subject: impl Into<String>, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self::Input { subject: subject.into(), problem: problem.into(), remedy: remedy.into() }
+        let (subject, problem) = (legible(&subject.into()), legible(&problem.into()));
+        Self::Input { subject, problem, remedy: remedy.into() }
     }
 
     /// The operating system's refusal, with what was being done to which path.
@@ -115,5 +116,40 @@ impl Error {
             Self::Interrupted => 130,
             _ => 2,
         }
+    }
+}
+
+/// The text with an exponent in numbers that are mostly zeros: f64 writes 1e300 with 301 digits.
+pub(crate) fn legible(text: &str) -> String {
+    const MOST_DIGITS: usize = 40;
+    let is_of_number = |c: char| c.is_ascii_digit() || c == '.';
+    let mut legible = String::with_capacity(text.len().min(1 << 10));
+    let mut rest = text;
+    while let Some(start) = rest.find(is_of_number) {
+        let (before, from) = rest.split_at(start);
+        let (number, after) = from.split_at(from.find(|c| !is_of_number(c)).unwrap_or(from.len()));
+        legible.push_str(before);
+        match number.parse::<f64>() {
+            Ok(value) if number.len() > MOST_DIGITS => legible.push_str(&format!("{value:e}")),
+            _ => legible.push_str(number),
+        }
+        rest = after;
+    }
+    legible + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_hundreds_of_digits_are_told_with_an_exponent() {
+        let error =
+            Error::input(format!("{} mm", 1e-300), format!("-{} is beyond 1e9", f64::MAX), "give less");
+        assert_eq!(error.to_string(), format!("1e-300 mm: -{:e} is beyond 1e9", f64::MAX));
+        for text in ["", "0..360:30", "faces 4000000000, 18446744073709551616", "v1.2.3 é 7"] {
+            assert_eq!(legible(text), text);
+        }
+        assert_eq!(legible(&"1.".repeat(30)), "1.".repeat(30));
     }
 }

@@ -8,6 +8,25 @@ use std::process::{Command, Output, Stdio};
 use common::{folder, study_in};
 
 #[test]
+fn a_list_of_paths_is_not_replaced_by_the_table_of_that_name() {
+    const LIST: &str =
+        "source_x_mm,source_y_mm,source_z_mm,target_x_mm,target_y_mm,target_z_mm\n0,-900,0,1,90,2\n";
+    let study = "scene = \"boxes.toml\"\npaths = { csv = \"paths.csv\" }\n";
+    let folder = folder(&[("study.toml", study), ("paths.csv", LIST)]);
+    let run = |output: &str| {
+        let args = ["dose", "study.toml", "-o", output];
+        let program = env!("CARGO_BIN_EXE_chordfield");
+        Command::new(program).current_dir(folder.path()).args(args).output().expect("the program runs")
+    };
+    let (refused, elsewhere) = (run("."), run("out"));
+    assert_eq!((refused.status.code(), elsewhere.status.code()), (Some(2), Some(0)));
+    let words = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(words.contains("paths.csv: the study reads this file"), "{words}");
+    assert_eq!(std::fs::read_to_string(folder.path().join("paths.csv")).expect("read"), LIST);
+    assert!(!folder.path().join("dose.json").exists() && folder.path().join("out/paths.csv").exists());
+}
+
+#[test]
 fn bad_studies_are_refused_with_their_line() {
     let folder = folder(&[]);
     std::fs::write(

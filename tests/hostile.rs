@@ -176,6 +176,38 @@ fn links_that_lead_out_of_the_scenes_folder_are_not_followed_and_what_meshes_nam
     assert_eq!(run.status.code(), Some(0), "{}", said(&run));
 }
 
+#[cfg(unix)]
+#[test]
+fn named_pipes_are_refused_wherever_a_file_is_read_or_replaced() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("a file");
+    write("balls.toml", &nested_balls(16));
+    write("study.toml", "scene = \"balls.toml\"\npaths = { points = [{ at_mm = [0, 0, 0] }] }\n");
+    write("list.toml", "scene = \"balls.toml\"\npaths = { csv = \"pipe\" }\n");
+    std::fs::create_dir_all(folder.path().join("parts/shard-1-of-2")).expect("a folder");
+    for pipe in ["pipe", "pipe.toml", "pipe.obj", "parts/shard-1-of-2/sums.json"] {
+        assert!(Command::new("mkfifo").arg(folder.path().join(pipe)).status().expect("mkfifo").success());
+    }
+    let commands: [&[&str]; 7] = [
+        &["project", "balls.toml", "--load-trees", "pipe"],
+        &["project", "balls.toml", "--save-trees", "pipe"],
+        &["dose", "study.toml", "--join", "-o", "parts"],
+        &["dose", "list.toml"],
+        &["dose", "pipe"],
+        &["trace", "pipe.toml"],
+        &["check", "pipe.obj"],
+    ];
+    for args in commands {
+        // To open one would be to wait for ever.
+        let run =
+            Command::new("timeout").current_dir(folder.path()).args(["20", PROGRAM]).args(args).output();
+        let run = run.expect("timeout");
+        assert_eq!(run.status.code(), Some(2), "{args:?}: {}", said(&run));
+        assert!(said(&run).contains("not a regular file"), "{args:?}: {}", said(&run));
+    }
+    assert!(!folder.path().join("out").exists());
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn a_name_that_is_no_unicode_is_refused_not_a_crash() {

@@ -124,6 +124,28 @@ fn oracles_sweeps_benchmarks_and_checks_are_stopped_at_once() {
     stop(&["check", "adult", "adult", "adult", "adult", "adult", "adult"], 50, |_| {});
 }
 
+#[test]
+fn benchmarks_stopped_leave_a_whole_report_of_what_was_measured_or_none() {
+    for bench in ["choice", "scale", "paper"] {
+        for (signal, exit_code) in SIGNALS {
+            let folder = folder();
+            let mut child = start(folder.path(), &["bench", bench, "-o", "out"]);
+            wait_until_signals_are_caught(&mut child);
+            pause(600);
+            let killed = Command::new("kill").args([signal, &child.id().to_string()]).status().expect("kill");
+            assert!(killed.success(), "{bench} had ended by itself");
+            let run = child.wait_with_output().expect("it ends");
+            assert_eq!(run.status.code(), Some(exit_code), "{bench} {signal}: {}", err(&run));
+            let left = files(&folder.path().join("out"));
+            assert!(!left.iter().any(|file| file.to_string_lossy().contains(".chordfield-")), "{left:?}");
+            for record in left.iter().filter(|file| file.extension().is_some_and(|e| e == "json")) {
+                let text = std::fs::read_to_string(record).expect("a record");
+                assert!(serde_json::from_str::<serde_json::Value>(&text).is_ok(), "{}", record.display());
+            }
+        }
+    }
+}
+
 /// A hundred million paths through the balls.
 const STUDY: &str = "scene = \"balls.toml\"
 paths = { field = { rectangle_mm = [80, 80], spacing_mm = 0.08 } }
@@ -202,25 +224,40 @@ fn a_file_that_may_not_grow_is_named_and_none_of_it_is_left() {
 
 #[test]
 fn a_full_disk_is_told_in_a_sentence_and_holds_no_part_of_the_file() {
-    let folder = folder();
-    std::fs::create_dir(folder.path().join("out")).expect("a folder");
-    // A disk of 64 kB, seen by the shell alone.
-    let script =
-        "mount -t tmpfs -o size=64k none out || exit 77; \"$0\" \"$@\"; code=$?; ls -A out >&2; exit $code";
-    let run = Command::new("unshare")
-        .current_dir(folder.path())
-        .args(["--map-root-user", "--mount", "sh", "-c", script, PROGRAM])
-        .args(PROJECT)
-        .output();
-    let Ok(run) = run else { return };
-    let said = err(&run);
-    if run.status.code() == Some(77) || said.contains("unshare failed") {
-        // No disk may be made here; the limit of a file's size stands for it above.
-        return;
+    // The first file that does not fit; what fits before it is whole.
+    let commands: [(&[&str], &str); 5] = [
+        (&PROJECT, "out/balls-g000-p.mha"),
+        (
+            &["project", "balls.toml", "--method", "ritree", "-o", "images", "--save-trees", "out/trees"],
+            "out/trees",
+        ),
+        (&["dose", "study.toml", "--set", "paths.field.spacing=2"], "out/path"),
+        (&["trace", "random-volumes", "--count", "2", "--size", "400x400"], "out/random-volumes"),
+        (&["phantom", "export", "adult", "out"], "out/meshes/trunk.obj"),
+    ];
+    for (args, file) in commands {
+        let folder = folder();
+        std::fs::create_dir(folder.path().join("out")).expect("a folder");
+        // A disk of 64 kB, seen by the shell alone.
+        let script = "mount -t tmpfs -o size=64k none out || exit 77; \"$0\" \"$@\"; code=$?; ls -AR out >&2; exit $code";
+        let run = Command::new("unshare")
+            .current_dir(folder.path())
+            .args(["--map-root-user", "--mount", "sh", "-c", script, PROGRAM])
+            .args(args)
+            .output();
+        let Ok(run) = run else { return };
+        let said = err(&run);
+        if run.status.code() == Some(77) || said.contains("unshare failed") {
+            // No disk may be made here; the limit of a file's size stands for it above.
+            return;
+        }
+        assert_eq!(run.status.code(), Some(2), "{args:?}: {said}");
+        assert!(
+            said.contains(&format!("cannot write {file}")) && said.contains("No space left"),
+            "{args:?}: {said}"
+        );
+        assert!(!said.contains(".chordfield-") && !said.contains(".json"), "{args:?}: {said}");
     }
-    assert_eq!(run.status.code(), Some(2), "{said}");
-    assert!(said.contains("cannot write out/balls-g000-p.mha") && said.contains("No space left"), "{said}");
-    assert!(!said.contains(".chordfield-") && !said.contains("balls.json"), "{said}");
 }
 
 #[test]
@@ -238,7 +275,13 @@ fn folders_where_nothing_can_be_made_are_named() {
 
 #[test]
 fn readers_that_have_seen_enough_end_a_run_quietly_when_its_files_are_whole() {
-    let commands: [(&[&str], Option<&str>); 6] = [
+    let trace = ["trace", "random-volumes", "--count", "1", "--size", "32x32", "--json"];
+    let commands: [(&[&str], Option<&str>); 11] = [
+        (&["dose", "study.toml", "--set", "paths.field.spacing=20", "--json"], Some("out/dose.json")),
+        (&trace, Some("out/random-volumes.json")),
+        (&["bench", "curve", "balls.toml", "--sizes", "8x8", "--rounds", "1", "--json"], None),
+        (&["completions", "bash"], None),
+        (&["audit", "balls.toml", "--organ", "outer", "--ray=0,0,-90,0,0,90"], None),
         (&["project", "balls.toml", "--json"], Some("out/balls.json")),
         (&["audit", "balls.toml", "--json", "-o", "out"], Some("out/audit.json")),
         (&["audit", "balls.toml", "--stress", "8"], None),

@@ -85,11 +85,19 @@ fn what_cannot_be_taken_over_is_refused_in_one_sentence_and_nothing_is_written()
             "without the places of chords",
         ),
         (&["audit", "ball.toml", "--method", "walk", "--save-trees", "x"], "--method walk makes no trees"),
+        (
+            &["project", "ball.toml", "-o", "out", "--save-trees", "ball.toml"],
+            "ball.toml: is there and holds no trees",
+        ),
     ] {
         let run = run(args);
         assert_eq!(run.status.code(), Some(2), "{args:?}");
         let words = words(&run);
         assert!(words.contains(refusal), "{args:?}: {words}");
         assert!(!folder.path().join("out").exists() && !folder.path().join("x").exists());
+        assert_eq!(std::fs::read_to_string(folder.path().join("ball.toml")).expect("read"), SCENE);
     }
+    // Trees may take the place of trees.
+    let again = run(&[&audit[..], &["--save-trees", "ball.trees"]].concat());
+    assert!(again.status.success(), "{}", words(&again));
 }

@@ -1,20 +1,27 @@
 //! Mutations of a corpus, by every parser: what is read is sound and is traced as rationals say, all else is refused in words.
 
+use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use chordfield::exact::Body;
-use chordfield::geometry::ClosedMesh;
+use chordfield::geometry::{ClosedMesh, convex_hull};
 use chordfield::modes::Control;
+use chordfield::modes::project::{
+    Interpolation, KeepsTrees, Method, Projector, TREES_BEGIN, TreeSettings, Wanted,
+};
 use chordfield::modes::stability::{Effort, sweep};
 use chordfield::physics::Spectrum;
 use chordfield::scene::mesh_file::{ReadOptions, read_bytes};
 use chordfield::scene::trace::{Recipe, open};
 use chordfield::scene::{Folder, Scene, SceneText};
 use chordfield::study::Study;
+use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use sha2::{Digest, Sha256};
 
 /// What mutations like to insert: borders of types, and words of the formats.
 const TOKENS: [&str; 32] = [
@@ -76,11 +83,16 @@ fn mutate(bytes: &mut Vec<u8>, others: &[(PathBuf, Vec<u8>)], rng: &mut Pcg64) {
     }
 }
 
-/// Every file of the corpus.
+/// Every file of the corpus, and one of trees, which is this program's own and is made anew.
 fn corpus() -> Vec<(PathBuf, Vec<u8>)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus");
     let paths = std::fs::read_dir(folder).expect("the corpus").map(|entry| entry.expect("an entry").path());
     let mut files: Vec<_> = paths.map(|path| (path.clone(), std::fs::read(path).expect("a file"))).collect();
+    let mut trees = Vec::new();
+    let grown = projector();
+    look(&grown);
+    grown.save_trees(&mut trees).expect("written");
+    files.push(("made/ball.trees".into(), trees));
     files.sort();
     files
 }
@@ -97,7 +109,7 @@ enum Fate {
 type Reader = fn(&Path, &[u8], u64) -> Fate;
 
 /// Who reads what, by how the file's name ends; the first that fits.
-const READERS: [(&str, Reader); 8] = [
+const READERS: [(&str, Reader); 10] = [
     ("trace.toml", read_trace_scene),
     ("study.toml", read_study),
     ("paths.csv", read_list_of_paths),
@@ -106,6 +118,8 @@ const READERS: [(&str, Reader); 8] = [
     (".obj", read_mesh),
     (".stl", read_mesh),
     (".ply", read_mesh),
+    (".trees", read_trees),
+    (".points", read_points),
 ];
 
 /// Feeds bytes to whoever reads such files.
@@ -193,6 +207,80 @@ fn read_mesh(path: &Path, bytes: &[u8], seed: u64) -> Fate {
     }
 }
 
+/// A scene of one ball, for kept trees.
+fn ball() -> &'static Scene {
+    static BALL: OnceLock<Scene> = OnceLock::new();
+    const TEXT: &str = r#"
+        beam = { detector = { size_mm = [150, 150], pixels = [6, 6] } }
+        spectrum = { energy_keV = 60 }
+        organ = [{ name = "ball", material = "water", density_g_cm3 = 1,
+                   shape = { kind = "ellipsoid", half_axes_mm = [50, 40, 30], faces = 3000 } }]
+    "#;
+    BALL.get_or_init(|| Scene::build(&text("ball.toml", TEXT.as_bytes()), &Folder::none()).expect("a scene"))
+}
+
+fn projector() -> Projector<'static> {
+    let interpolation = Interpolation::SquaredChord { tolerance_mm: 5.0 };
+    let method = Method::RiTree(TreeSettings { interpolation, ..TreeSettings::default() });
+    let wanted = Wanted { lengths: true, attenuation: false, colour: false };
+    Projector::new(ball(), wanted, None, method).expect("a projector")
+}
+
+/// All lengths of the ball's view, which must be numbers of millimetres.
+fn look(projector: &Projector) -> Vec<f32> {
+    let view = &ball().beam.views().expect("a view")[0];
+    let lengths = projector.project(view, 0, &Control::none()).expect("a projection").own_length_mm(0);
+    assert!(lengths.iter().all(|length| *length >= 0.0), "{lengths:?}");
+    lengths
+}
+
+/// Trees of the ball, mostly under a length and a checksum that are right, so that what is behind these is read, too.
+fn read_trees(_: &Path, bytes: &[u8], seed: u64) -> Fate {
+    const HEAD: usize = TREES_BEGIN.len() + 4 + 8;
+    const CHECKSUM: usize = 32;
+    let mut bytes = bytes.to_vec();
+    if !seed.is_multiple_of(8) && bytes.len() >= HEAD + CHECKSUM {
+        let end = bytes.len() - CHECKSUM;
+        bytes[HEAD - 8..HEAD].copy_from_slice(&((end - HEAD) as u64).to_le_bytes());
+        let checksum = Sha256::digest(&bytes[..end]);
+        bytes[end..].copy_from_slice(&checksum);
+    }
+    let mut projector = projector();
+    match projector.load_trees(&mut Cursor::new(bytes)) {
+        Ok(_) => {
+            look(&projector);
+            Fate::Read
+        }
+        Err(error) => {
+            assert!(!error.to_string().is_empty());
+            Fate::Refused
+        }
+    }
+}
+
+/// Points as numbers of 8 bytes: their convex hull must be proved convex, and clipped as rationals clip it.
+fn read_points(_: &Path, bytes: &[u8], seed: u64) -> Fate {
+    let (numbers, _) = bytes.as_chunks::<8>();
+    let numbers: Vec<f64> = numbers.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
+    let (points, _) = numbers.as_chunks::<3>();
+    let points: Vec<DVec3> = points.iter().map(|point| DVec3::from(*point)).collect();
+    match convex_hull(&points) {
+        Ok(hull) => {
+            let closed = ClosedMesh::new(hull.clone()).map(|(surface, _)| surface);
+            if let Ok(surface) = closed {
+                let size = surface.bounds().diagonal();
+                let body = Body::new(surface);
+                assert!(!(1e-6..1e6).contains(&size) || body.convexity().is_ok(), "{points:?}");
+            }
+            trace(hull, seed)
+        }
+        Err(error) => {
+            assert!(!error.to_string().is_empty());
+            Fate::Refused
+        }
+    }
+}
+
 /// An error in words is what bad input gets.
 fn refused(error: &chordfield::Error) -> Fate {
     assert!(!error.to_string().is_empty());
@@ -242,9 +330,10 @@ fn fuzz(seed: u64, done: impl Fn(u64) -> bool) -> [u64; 4] {
 #[test]
 fn the_corpus_itself_is_read() {
     for (path, bytes) in corpus() {
-        let is_mesh =
-            path.extension().is_some_and(|e| ["obj", "stl", "ply"].contains(&&*e.to_string_lossy()));
-        let expected = if is_mesh { Fate::Traced } else { Fate::Read };
+        let is_surface = path
+            .extension()
+            .is_some_and(|e| ["obj", "stl", "ply", "points"].contains(&&*e.to_string_lossy()));
+        let expected = if is_surface { Fate::Traced } else { Fate::Read };
         assert_eq!(feed(&path, &bytes, 1), expected, "{}", path.display());
     }
 }
@@ -258,6 +347,9 @@ fn mutations_of_every_kind_of_file_are_read_soundly_or_refused_in_words() {
     );
 }
 
+/// 2026-11-25, beside other work, 2 404 s from the seed 77: 73 769 mutations, of which 65 908 were refused, 4 147 read and 3 714
+/// traced; none crashed.
+///
 /// For `CHORDFIELD_FUZZ_SECONDS`, an hour if that is not said, from the seed `CHORDFIELD_FUZZ_SEED`; tells its counts.
 #[test]
 #[ignore = "an hour, or as long as CHORDFIELD_FUZZ_SECONDS says"]

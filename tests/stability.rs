@@ -58,10 +58,24 @@ fn a_million_rays_aimed_at_what_is_hard_are_neither_lost_nor_wrong_by_any_engine
 }
 
 #[test]
-#[ignore = "a hundred million rays, half an hour"]
+#[ignore = "a hundred million rays, ten minutes of a core"]
 fn a_hundred_million_rays_aimed_at_what_is_hard_are_neither_lost_nor_wrong() {
-    let effort = Effort { rays: 900_000, recomputed: 1_000, seed: 4 };
-    assert_explained(&swept(&bodies(true), effort, 100_000_000));
+    let bodies = bodies(true);
+    let effort = Effort::aiming(100_000_000, bodies.iter().map(|(_, body)| body), 4);
+    assert_explained(&swept(&bodies, effort, 100_000_000));
+}
+
+#[test]
+fn so_many_rays_are_aimed_as_are_asked_for() {
+    let bodies = bodies(false);
+    let of_bodies = || bodies.iter().map(|(_, body)| body);
+    for asked in [1, 10_000, 1_000_000, 100_000_000] {
+        let effort = Effort::aiming(asked, of_bodies(), 1);
+        let aimed = rays(of_bodies(), effort);
+        // Eight rays at least of each case and body; and each step is a ray of each.
+        assert!(aimed >= asked && aimed <= asked + 100 * 15 * 13, "{asked}: {aimed}");
+        assert!(effort.rays == 1 || rays(of_bodies(), Effort { rays: effort.rays - 1, ..effort }) < asked);
+    }
 }
 
 #[test]
@@ -131,6 +145,8 @@ fn the_documented_table_has_every_case_and_body_and_none_lost() {
         assert!(rows.iter().any(|row| row[1] == name), "{name} is missing: make the table again");
     }
     assert!(rows.iter().all(|row| row[4] == "0"), "rays are lost");
+    let totals = documented.lines().last().expect("the totals");
+    assert!(totals.contains(" by `raster`") && totals.contains("Lost: 0. Disagree: 0."), "{totals}");
     // The same head as sweeps print today.
     assert!(table(&[]).lines().all(|line| documented.contains(line)));
 }

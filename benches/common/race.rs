@@ -10,8 +10,12 @@ use crate::rays::RaySet;
 use crate::samples::Samples;
 use crate::{Contestant, Entrant};
 
-/// Two threads share this many parts of a set of rays.
-const PARTS: u32 = 16;
+/// Stretches of a batch, which two threads share.
+const STRETCHES: u32 = 16;
+
+/// Rows of a band of an image, at most: those of the program's tiles. The zeros to which lengths are added are then still in a
+/// cache, and two threads share the bands.
+const BAND_ROWS: usize = 64;
 
 /// A contestant leaves the race after this long on one thread, but not before it has run [`LEAST_ROUNDS`].
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -73,14 +77,14 @@ impl Check {
     }
 }
 
-/// All lengths, from making ready to the last; in parts, if that is to say so.
+/// All lengths, from making ready to the last.
 type Task<'a> = Box<dyn Fn(&mut [f64], Share) + Sync + 'a>;
 
-/// Whether a task runs whole, or in parts on the threads of the pool it runs in.
+/// Whether a task's parts run one after the other, or on the threads of the pool it runs in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Share {
-    Whole,
-    Parts,
+    InTurn,
+    Abreast,
 }
 
 /// Races on one set of rays. `None` for contestants that do not take it.
@@ -108,20 +112,20 @@ pub fn race_of_organs(entrants: &[Entrant], organs: &Organs, rounds: usize) -> V
 
 fn task<'a>(contestant: &'a dyn Contestant, rays: &'a RaySet) -> Option<Task<'a>> {
     contestant.tracer(rays).is_some().then_some(())?;
-    let (whole, parts) = (rays.whole(), rays.parts(PARTS));
+    let parts = rays.parts(match rays {
+        RaySet::Grid(grid) => grid.whole().rows.len().div_ceil(BAND_ROWS) as u32,
+        RaySet::Batch(_) => STRETCHES,
+    });
     Some(Box::new(move |lengths, share| {
         let tracer = contestant.tracer(rays).expect("it took them before");
+        let trace = |(part, lengths): (&Region, &mut [f64])| {
+            lengths.fill(0.0);
+            tracer(part, lengths);
+        };
+        let jobs = share_out(&parts, lengths);
         match share {
-            Share::Whole => {
-                lengths.fill(0.0);
-                tracer(&whole, lengths);
-            }
-            Share::Parts => {
-                share_out(&parts, lengths).into_par_iter().with_max_len(1).for_each(|(part, lengths)| {
-                    lengths.fill(0.0);
-                    tracer(part, lengths);
-                });
-            }
+            Share::InTurn => jobs.into_iter().for_each(trace),
+            Share::Abreast => jobs.into_par_iter().with_max_len(1).for_each(trace),
         }
     }))
 }
@@ -140,8 +144,8 @@ fn task_of_organs<'a>(
         let regions: Vec<Region> = organs.surfaces.iter().map(|s| organs.pixels_of(s)).collect();
         let jobs: Vec<_> = share_out(&regions, lengths).into_iter().enumerate().collect();
         match share {
-            Share::Whole => jobs.into_iter().for_each(|(i, (region, lengths))| trace(i, region, lengths)),
-            Share::Parts => jobs
+            Share::InTurn => jobs.into_iter().for_each(|(i, (region, lengths))| trace(i, region, lengths)),
+            Share::Abreast => jobs
                 .into_par_iter()
                 .with_max_len(1)
                 .for_each(|(i, (region, lengths))| trace(i, region, lengths)),
@@ -169,7 +173,7 @@ fn race_tasks(tasks: Vec<Option<Task<'_>>>, count: usize, rounds: usize) -> Vec<
         .iter()
         .map(|task| {
             let task = task.as_ref()?;
-            two.install(|| task(&mut lengths, Share::Parts));
+            two.install(|| task(&mut lengths, Share::Abreast));
             let check = Check::new(&lengths, judge.get_or_insert_with(|| lengths.clone()));
             Some(Figures { one_thread: Samples::default(), two_threads: Samples::default(), check })
         })
@@ -182,8 +186,8 @@ fn race_tasks(tasks: Vec<Option<Task<'_>>>, count: usize, rounds: usize) -> Vec<
                 continue;
             }
             let runs = [
-                (&one, Share::Whole, &mut figures.one_thread),
-                (&two, Share::Parts, &mut figures.two_threads),
+                (&one, Share::InTurn, &mut figures.one_thread),
+                (&two, Share::Abreast, &mut figures.two_threads),
             ];
             for (pool, share, times) in runs {
                 let start = Instant::now();

@@ -3,6 +3,7 @@
 mod audit;
 mod bench;
 mod dose;
+mod parse;
 mod trace;
 
 use std::path::PathBuf;
@@ -14,6 +15,7 @@ use crate::physics::DetectorResponse;
 pub use audit::{AuditArgs, RayArgs};
 pub use bench::{BenchCommand, ChoiceArgs, CurveArgs, PaperArgs, RunArgs, ScaleArgs};
 pub use dose::{DoseArgs, FormatArg, TableArg};
+use parse::{parse_extent, parse_mm, parse_pair, parse_pixels, parse_point, parse_window};
 pub use trace::{Application, TraceArgs};
 
 /// Exact intersection lengths of rays with organs: projection images of phantoms, with their numbers.
@@ -379,42 +381,4 @@ pub enum BeamKindArg {
     Cone,
     /// All along one direction.
     Parallel,
-}
-
-fn numbers<const N: usize, T: std::str::FromStr>(text: &str, separator: char) -> Result<[T; N], String> {
-    let parts: Vec<T> = text
-        .split(separator)
-        .map(|part| part.trim().parse().map_err(|_| format!("`{}` is not such a number", part.trim())))
-        .collect::<Result<_, _>>()?;
-    parts.try_into().map_err(|_| format!("give {N} numbers joined by `{separator}`"))
-}
-
-fn parse_point(text: &str) -> Result<[f64; 3], String> {
-    numbers(text, ',')
-}
-
-fn parse_pair(text: &str) -> Result<[f64; 2], String> {
-    numbers(text, ',')
-}
-
-fn parse_pixels(text: &str) -> Result<[u32; 2], String> {
-    numbers(text, 'x')
-}
-
-fn parse_extent(text: &str) -> Result<[f64; 2], String> {
-    numbers(text, 'x')
-}
-
-/// Millimetres, with or without the unit.
-fn parse_mm(text: &str) -> Result<f64, String> {
-    let number = text.strip_suffix("mm").unwrap_or(text).trim();
-    number.parse().map_err(|_| "give millimetres, as `0.1mm` or `0.1`".into())
-}
-
-fn parse_window(text: &str) -> Result<[f64; 2], String> {
-    let (low, high) = text.split_once("..").ok_or("give two numbers joined by `..`")?;
-    match [low, high].map(|part| part.trim().parse::<f64>()) {
-        [Ok(low), Ok(high)] if low < high && low.is_finite() && high.is_finite() => Ok([low, high]),
-        _ => Err("give two finite numbers, the lower first, as `0..5`".into()),
-    }
 }

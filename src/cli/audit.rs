@@ -7,7 +7,8 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::args::{AuditArgs, RayArgs};
-use super::project::{change, method, method_named, open};
+use super::method::{method, method_named};
+use super::project::{change, open};
 use super::{Outcome, Session, command_line, keep, print, shell_words};
 use crate::error::{Error, Result};
 use crate::modes::Control;

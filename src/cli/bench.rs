@@ -23,6 +23,9 @@ const PATIENCE_S: f64 = 3.0;
 /// The same in a hurry.
 const HURRY: Patience = Patience { rounds: 3, seconds: 0.5 };
 
+/// A contender that would take longer for one size is left out in a hurry, seconds.
+const HURRY_LIMIT_S: f64 = 10.0;
+
 /// Sizes in a hurry are no larger than this, columns times rows.
 const SMALL: u64 = 600 * 600;
 
@@ -61,10 +64,10 @@ fn run_curve(args: &CurveArgs, session: &Session, out: &mut dyn Write) -> Result
         ));
     }
     let settings = CurveSettings {
-        contenders: CurveSettings::contenders(),
+        contenders: CurveSettings::contenders(args.run.quick),
         sizes,
         patience: patience(&args.run),
-        limit_s: args.limit_s,
+        limit_s: if args.run.quick { args.limit_s.min(HURRY_LIMIT_S) } else { args.limit_s },
     };
     settings.check(&scene)?;
     let mut report = measure(session, &args.run, curve::turns(&settings), &scene.name, |control| {

@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::args::{DoseArgs, FormatArg, TableArg};
-use super::project::method;
+use super::method::method;
 use super::{Session, command_line, keep, print};
 use crate::error::{Error, Result};
 use crate::modes::Control;
@@ -29,6 +29,7 @@ pub fn run(args: &DoseArgs, session: &Session, out: &mut dyn Write) -> Result<()
     let method = keep::method(&args.keep, method(&(&args.method).into())?)?;
     let study = Study::load(&args.study, &args.settings, args.zip)?;
     let mut dose = Dose::new(&study, method)?;
+    output::spare_inputs(&args.output, &args.study, &study)?;
     keep::load(&args.keep, &mut dose, session)?;
     if args.dry_run || !args.json {
         let plan = Plan::of(&dose, args.shard.unwrap_or(Shard::WHOLE));

@@ -9,8 +9,9 @@ use crate::output::trees;
 /// The method, if trees can be kept by it: who names a file of trees asks for trees, so that there is nothing left to choose.
 ///
 /// # Errors
-/// One that makes none.
+/// One that makes none; a file that trees may not replace, before any work is done.
 pub fn method(args: &KeepArgs, method: Method) -> Result<Method> {
+    args.save_trees.as_deref().map_or(Ok(()), trees::check_target)?;
     let asked = [("--load-trees", &args.load_trees), ("--save-trees", &args.save_trees)];
     let asked = asked.into_iter().find_map(|(name, file)| file.is_some().then_some(name));
     match (asked, method) {

@@ -6,6 +6,7 @@ mod bench;
 mod check;
 mod dose;
 mod keep;
+mod method;
 mod phantom;
 mod project;
 mod session;

@@ -6,7 +6,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::args::{Application, InterpolationArg, MethodArg, TraceArgs};
-use super::{Session, print, project};
+use super::{Session, method, print};
 use crate::error::{Error, Result};
 use crate::geometry::{Counted, Real};
 use crate::modes::Control;
@@ -269,8 +269,8 @@ fn tracing(args: &TraceArgs) -> Result<Tracing> {
     match args.method.method {
         MethodArg::Exact => Ok(Tracing::Exact),
         MethodArg::Ritree | MethodArg::Auto => {
-            let (cache_bytes, kept_share) = project::cache(trees)?;
-            Ok(Tracing::RiTree(Trees { parameters: project::parameters(trees)?, cache_bytes, kept_share }))
+            let (cache_bytes, kept_share) = method::cache(trees)?;
+            Ok(Tracing::RiTree(Trees { parameters: method::parameters(trees)?, cache_bytes, kept_share }))
         }
         other => Err(Error::input(
             format!("--method {}", other.name()),

@@ -25,6 +25,7 @@ mod parts;
 pub mod raster;
 pub mod rational;
 mod record;
+mod round;
 mod shear;
 pub mod walk;
 

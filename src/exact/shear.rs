@@ -23,7 +23,7 @@ pub(super) struct Sheared {
 }
 
 /// A line's frame. Counter-clockwise seen against the line stays counter-clockwise.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Shear {
     origin: DVec3,
     /// The axes that become the first, second and third.
@@ -84,13 +84,6 @@ impl Shear {
         let p = vertex - self.origin;
         let [x, y, z] = self.across;
         [(p.x * x[0] + p.y * y[0]) + p.z * z[0], (p.x * x[1] + p.y * y[1]) + p.z * z[1]]
-    }
-
-    /// What a place's products with make its coordinates across, but for where the origin lies.
-    #[inline(always)]
-    pub fn rows_across(&self) -> [DVec3; 2] {
-        let [x, y, z] = self.across;
-        [DVec3::new(x[0], y[0], z[0]), DVec3::new(x[1], y[1], z[1])]
     }
 
     /// Where `vertex` lies along the line, in the direction's length; errs by γ₃ of itself.

@@ -73,11 +73,13 @@ impl RayGrid {
     }
 
     /// The point of a column and a row, mm.
+    #[inline]
     pub fn point(&self, column: u32, row: u32) -> DVec3 {
         self.origin + f64::from(column) * self.column_step + f64::from(row) * self.row_step
     }
 
     /// Where the ray to `target` starts, mm.
+    #[inline]
     pub fn start_of(&self, target: DVec3) -> DVec3 {
         match self.upstream {
             Upstream::Source(source) => source,
@@ -86,6 +88,7 @@ impl RayGrid {
     }
 
     /// The ray to the point of a column and a row. Points off the grid have one as well, while finite.
+    #[inline]
     pub fn segment(&self, column: u32, row: u32) -> Segment {
         let target = self.point(column, row);
         Segment::between(self.start_of(target), target)

@@ -15,26 +15,31 @@ impl Interval {
     pub const UNIT: Self = Self { start: 0.0, end: 1.0 };
 
     /// The interval, or `None` if `start > end` or an end is NaN.
+    #[inline]
     pub fn new(start: f64, end: f64) -> Option<Self> {
         (start <= end).then_some(Self { start, end })
     }
 
     /// Where the stretch begins, mm.
+    #[inline]
     pub fn start(&self) -> f64 {
         self.start
     }
 
     /// Where the stretch ends, mm.
+    #[inline]
     pub fn end(&self) -> f64 {
         self.end
     }
 
     /// How long it is, mm.
+    #[inline]
     pub fn length(&self) -> f64 {
         self.end - self.start
     }
 
     /// The common part, or `None` if there is none.
+    #[inline]
     pub fn intersection(&self, other: &Self) -> Option<Self> {
         Self::new(self.start.max(other.start), self.end.min(other.end))
     }

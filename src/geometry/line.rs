@@ -48,11 +48,13 @@ impl Line {
     }
 
     /// The point at `t = 0`, mm.
+    #[inline]
     pub fn origin(&self) -> DVec3 {
         self.origin
     }
 
     /// The direction as a vector of unit length.
+    #[inline]
     pub fn dir(&self) -> DVec3 {
         self.dir.0
     }
@@ -90,11 +92,13 @@ impl Segment {
     }
 
     /// The supporting line; its origin is the source.
+    #[inline]
     pub fn line(&self) -> &Line {
         &self.line
     }
 
     /// The part of the line that is the path: from 0 to its length, mm.
+    #[inline]
     pub fn reach(&self) -> Interval {
         // The constructor keeps the length positive and finite.
         Interval::new(0.0, self.length_mm).unwrap_or(Interval::EVERYTHING)

@@ -28,7 +28,8 @@ pub fn write_atomically(path: &Path, content: impl FnOnce(&mut dyn Write) -> io:
 #[derive(Debug)]
 pub struct AtomicFile {
     path: PathBuf,
-    out: BufWriter<tempfile::NamedTempFile>,
+    out: BufWriter<File>,
+    temporary: tempfile::NamedTempFile,
 }
 
 impl AtomicFile {
@@ -38,7 +39,9 @@ impl AtomicFile {
     /// As [`write_atomically`].
     pub fn begin(path: &Path) -> Result<Self> {
         let temporary = temporary_file_for(path)?;
-        Ok(Self { path: path.to_owned(), out: BufWriter::with_capacity(1 << 16, temporary) })
+        // A handle of its own: the temporary file's would add its name to what the disk says.
+        let file = temporary.as_file().try_clone().map_err(|e| Error::io("create", path, e))?;
+        Ok(Self { path: path.to_owned(), out: BufWriter::with_capacity(1 << 16, file), temporary })
     }
 
     /// Adds bytes at its end.
@@ -54,9 +57,9 @@ impl AtomicFile {
     /// # Errors
     /// If the disk refuses, also at the last flush; then nothing appears.
     pub fn commit(self) -> Result<()> {
-        let Self { path, out } = self;
-        let temporary = out.into_inner().map_err(|e| Error::io("write", &path, e.into_error()))?;
-        temporary.as_file().sync_all().map_err(|e| Error::io("write", &path, e))?;
+        let Self { path, out, temporary } = self;
+        let file = out.into_inner().map_err(|e| Error::io("write", &path, e.into_error()))?;
+        file.sync_all().map_err(|e| Error::io("write", &path, e))?;
         temporary.persist(&path).map_err(|e| Error::io("replace", &path, e.error))?;
         Ok(())
     }

@@ -1,7 +1,5 @@
 //! What a cell's samples decide: whether it is final, and what its lines get. Pure functions of the cell.
 
-use nalgebra::{SMatrix, SVector};
-
 use super::Parameters;
 use super::attribute::Attribute;
 use crate::geometry::Real;
@@ -146,12 +144,14 @@ impl Place {
         self.depth >= parameters.max_depth.min(DEEPEST)
     }
 
-    /// What is to be done with the cell (§2.3, and §2.5 for its kind). Its corners are finished if that tells it.
+    /// What is to be done with the cell (§2.3, and §2.5 for its kind). Its corners are finished if that tells it;
+    /// `middle_sampled` is told of each sample of a midpoint test.
     pub fn verdict<A: Attribute>(
         &self,
         attribute: &A,
         corners: &mut Corners<A::Output>,
         parameters: &Parameters,
+        middle_sampled: impl Fn(),
     ) -> Verdict {
         let is_deepest = self.depth.saturating_add(attribute.levels_spared()) >= parameters.max_depth
             || self.is_deepest(parameters);
@@ -170,8 +170,10 @@ impl Place {
         if attribute.outline_within(&corners[0]).is_some() {
             let outlines =
                 corners.each_ref().map(|c| attribute.outline_within(c).unwrap_or_else(|| c.clone()));
-            let by_outlines =
-                self.smoothness(attribute, &outlines, parameters, |line| attribute.outline(line));
+            let by_outlines = self.smoothness(attribute, &outlines, parameters, |line| {
+                middle_sampled();
+                attribute.outline(line)
+            });
             if by_outlines != Verdict::Final(Kind::Smooth) {
                 return by_outlines;
             }
@@ -183,7 +185,10 @@ impl Place {
         if attribute.is_told_by_outline(&corners[0]) {
             return Verdict::Final(Kind::Smooth);
         }
-        self.smoothness(attribute, corners, parameters, |line| attribute.sample(line))
+        self.smoothness(attribute, corners, parameters, |line| {
+            middle_sampled();
+            attribute.sample(line)
+        })
     }
 
     /// What is to be done with a cell of one class by how near to each other its corners are, and by the midpoint test:
@@ -228,8 +233,9 @@ impl Place {
         if spread_exceeds(attribute, usable.iter().map(|&bits| &corners[bits]), angular_threshold_deg) {
             return Err(Reason::Angle);
         }
-        let weights = linear_weights(&usable, self.cell.fractions(&stuv)).ok_or(Reason::Silhouette)?;
-        let part = |(&bits, weight)| (A::Real::of(weight), &corners[bits]);
+        let fractions = self.cell.fractions(&stuv.map(A::Real::of));
+        let weights = linear_weights(&usable, fractions).ok_or(Reason::Silhouette)?;
+        let part = |(&bits, weight)| (weight, &corners[bits]);
         let parts: Vec<_> = usable.iter().zip(weights).map(part).collect();
         Ok(attribute.interpolate(&parts))
     }
@@ -266,16 +272,40 @@ pub fn quadrilinear<A: Attribute>(
 
 /// The weights of the corners `usable` in the linear function that fits them best, at `fractions`. `None` if they do not
 /// define one: fewer than five, or all in one hyperplane.
-fn linear_weights(usable: &[usize], fractions: [f64; 4]) -> Option<Vec<f64>> {
+fn linear_weights<R: Real>(usable: &[usize], fractions: [R; 4]) -> Option<Vec<R>> {
     if usable.len() < LINEAR_SAMPLES {
         return None;
     }
-    let row = |f: [f64; 4]| SVector::<f64, 5>::from([1.0, f[0], f[1], f[2], f[3]]);
-    let corner = |bits: usize| row(std::array::from_fn(|a| (bits >> a & 1) as f64));
-    let normal: SMatrix<f64, 5, 5> = usable.iter().map(|&bits| corner(bits) * corner(bits).transpose()).sum();
-    // Entries are small integers, so a singular matrix has a pivot that is zero up to rounding.
-    let at = normal.cholesky().filter(|c| c.l_dirty().diagonal().min() > 1e-6)?.solve(&row(fractions));
-    Some(usable.iter().map(|&bits| corner(bits).dot(&at)).collect())
+    // A corner's row of the linear system: 1, then its four coordinates.
+    let has = |bits: usize, column: usize| column == 0 || bits >> (column - 1) & 1 == 1;
+    let both = |i: usize, j: usize| usable.iter().filter(|&&bits| has(bits, i) && has(bits, j)).count();
+    let normal = std::array::from_fn(|i| std::array::from_fn(|j| R::of(both(i, j) as f64)));
+    let [s, t, u, v] = fractions;
+    let at = solve_by_cholesky(normal, [R::of(1.0), s, t, u, v])?;
+    let weight = |&bits: &usize| (1..5).filter(|&a| has(bits, a)).fold(at[0], |sum, a| sum + at[a]);
+    Some(usable.iter().map(weight).collect())
+}
+
+/// The x of Ax = b. `None` if A, symmetric and of small whole numbers, is singular: it has a pivot that is zero up to rounding.
+fn solve_by_cholesky<R: Real, const N: usize>(a: [[R; N]; N], b: [R; N]) -> Option<[R; N]> {
+    let mut l = [[R::default(); N]; N];
+    let mut y = b;
+    for i in 0..N {
+        for j in 0..=i {
+            let rest = (0..j).fold(a[i][j], |rest, k| rest - l[i][k] * l[j][k]);
+            l[i][j] = if i == j { rest.sqrt() } else { rest / l[j][j] };
+        }
+        let pivot = l[i][i].get();
+        // The root of what is negative by rounding is not a number.
+        if pivot.is_nan() || pivot <= 1e-6 {
+            return None;
+        }
+        y[i] = (0..i).fold(b[i], |rest, k| rest - l[i][k] * y[k]) / l[i][i];
+    }
+    for i in (0..N).rev() {
+        y[i] = (i + 1..N).fold(y[i], |rest, k| rest - l[k][i] * y[k]) / l[i][i];
+    }
+    Some(y)
 }
 
 /// Whether two of the outputs' directions differ by more than the threshold.
@@ -290,4 +320,38 @@ where
     let directions: Vec<_> = outputs.filter_map(|o| attribute.direction(o)).collect();
     let least_cosine = A::Real::of((attribute.angular_share() * threshold_deg).to_radians().cos());
     directions.iter().enumerate().any(|(i, a)| directions[..i].iter().any(|b| a.dot(*b) < least_cosine))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Counted;
+
+    const FRACTIONS: [f64; 4] = [0.2, 0.9, 0.35, 0.6];
+
+    #[test]
+    fn linear_functions_come_back_from_any_corners_that_define_them() {
+        let value = |f: [f64; 4]| 3.0 - f[0] + 2.0 * f[1] + 0.5 * f[2] - 4.0 * f[3];
+        let mut defined = 0;
+        for set in 0..1_usize << 16 {
+            let usable: Vec<usize> = (0..16).filter(|bits| set >> bits & 1 == 1).collect();
+            let Some(weights) = linear_weights(&usable, FRACTIONS) else { continue };
+            defined += 1;
+            let corner = |bits: usize| std::array::from_fn(|a| (bits >> a & 1) as f64);
+            let sum: f64 = usable.iter().zip(&weights).map(|(&bits, w)| w * value(corner(bits))).sum();
+            assert!((sum - value(FRACTIONS)).abs() < 1e-9, "{usable:?}: {sum}");
+        }
+        // All sets but those of fewer than five corners, or all in one hyperplane.
+        assert!((60_000..65_536 - 2_517).contains(&defined), "{defined}");
+        assert_eq!(linear_weights(&[0, 1, 2, 3, 4, 5, 6, 7], FRACTIONS), None, "all in one");
+    }
+
+    #[test]
+    fn finding_weights_is_counted() {
+        let (weights, operations) =
+            Counted::count(|| linear_weights(&[0, 1, 2, 4, 8], FRACTIONS.map(Counted::of)));
+        assert!(weights.is_some());
+        // Cholesky's n³/3 + n²/2 + n/6, n²/2 for each of two triangles, products and differences apart, and the weights.
+        assert!((100..200).contains(&operations), "{operations}");
+    }
 }

@@ -227,14 +227,16 @@ impl<A: Keepable> RiTree<A> {
                     self.load_cell(half, &place.half(side), from, cache, loaded)
                 })
             }
-            Record::Final(kind, mut corners) => {
+            Record::Final(kind, corners) => {
                 if !corners.iter().all(|output| self.attribute.is_sound(output)) {
                     return Err(Unreadable::damaged("a sample is not finite"));
                 }
                 let node = node.filter(|_| cache.reserve(size_of::<Leaf<A::Output>>()));
+                // A look at what was read is none of what growing the tree takes.
+                let mut looked_at = corners.clone();
+                let mut verdict = || place.verdict(&self.attribute, &mut looked_at, &self.parameters, || ());
                 if loaded.count(node.is_some())
-                    && (place.sample(&self.attribute) != corners
-                        || self.verdict(place, &mut corners) != Verdict::Final(kind))
+                    && (place.sample(&self.attribute) != corners || verdict() != Verdict::Final(kind))
                 {
                     return Err(Unreadable::damaged("a cell is not what this program makes of it"));
                 }

@@ -164,7 +164,8 @@ impl<A: Attribute> RiTree<A> {
     }
 
     fn verdict(&self, place: &Place, corners: &mut cell::Corners<A::Output>) -> Verdict {
-        place.verdict(&self.attribute, corners, &self.parameters)
+        let middle_sampled = || self.counters.sampled(1, 0);
+        place.verdict(&self.attribute, corners, &self.parameters, middle_sampled)
     }
 
     /// Lets time pass for the least-recently-used rule; call it now and then, such as once per tile of rays.

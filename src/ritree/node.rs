@@ -174,7 +174,7 @@ impl<T: Clone + Send + Sync> Node<T> {
         T: PartialEq + std::fmt::Debug,
     {
         let mut sampled = place.sample(&tree.attribute);
-        let verdict = tree.verdict(place, &mut sampled);
+        let verdict = place.verdict(&tree.attribute, &mut sampled, &tree.parameters, || ());
         // Corners are finished as the cells need that they came through.
         let finished = |corners: &Corners<T>| {
             let mut corners = corners.clone();

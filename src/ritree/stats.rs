@@ -48,7 +48,7 @@ impl BuildCounters {
 /// What building took so far. With a cache that is too small the numbers depend on the order of queries; answers do not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct BuildCounts {
-    /// Corner lines sampled exactly (middles of midpoint tests not counted).
+    /// Lines sampled exactly: corners, and middles of midpoint tests.
     pub samples_taken: u64,
     /// Corners of halves taken over from the cell or from each other.
     pub samples_reused: u64,

@@ -2,6 +2,8 @@
 
 mod keeping;
 
+use std::sync::atomic::AtomicU64;
+
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -128,6 +130,56 @@ fn samples_at_the_corners_of_cells_are_exact() {
         assert!(error.abs() < 1e-12, "{stuv:?}: {error}");
     }
     tree.check_invariants();
+}
+
+/// A [`Test`] that counts what it is asked for.
+struct Asked(Test, AtomicU64);
+
+impl Attribute for Asked {
+    type Output = Sample;
+    type Real = f64;
+
+    fn sample(&self, line: LinePoint) -> Sample {
+        self.1.fetch_add(1, Ordering::Relaxed);
+        self.0.sample(line)
+    }
+
+    fn class(&self, output: &Sample) -> u32 {
+        self.0.class(output)
+    }
+
+    fn distance(&self, a: &Sample, b: &Sample) -> f64 {
+        self.0.distance(a, b)
+    }
+
+    fn interpolate(&self, parts: &[(f64, &Sample)]) -> Sample {
+        self.0.interpolate(parts)
+    }
+
+    fn is_miss(&self, class: u32) -> bool {
+        self.0.is_miss(class)
+    }
+
+    fn is_certainly_empty(&self, _: PlanePair, _: &Cell) -> bool {
+        false
+    }
+}
+
+#[test]
+fn samples_taken_are_those_that_the_attribute_was_asked_for() {
+    let smooth = || Test::smooth(|[s, t, u, v]| (s + 2.0 * t).sin() + u * v * v);
+    for attribute in [smooth(), step(false)] {
+        for cache in [roomy(), Cache::new(20_000), Cache::new(0)] {
+            let asked = Asked(Test { ..attribute }, AtomicU64::new(0));
+            let tree = RiTree::new(asked, settings(0.05, 12));
+            for point in points(3, 300) {
+                let _ = tree.query(point, &cache);
+            }
+            let asked = tree.attribute().1.load(Ordering::Relaxed);
+            assert_eq!(tree.build_counts().samples_taken, asked);
+            assert!(asked > 1_000, "{asked}");
+        }
+    }
 }
 
 #[test]

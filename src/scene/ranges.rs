@@ -9,6 +9,9 @@ use serde::de::{self, Deserialize, Deserializer, SeqAccess, Visitor};
 /// orbit; far beyond it, the step is almost surely mistyped and the output would fill the disk.
 pub const MAX_VIEWS: usize = 10_000;
 
+/// Larger angles, some three thousand turns, are surely mistyped; names of files tell the angle.
+const MAX_DEG: f64 = 1e6;
+
 /// How far from a whole number of steps (or turns) an end may lie and still count as on it: decimal steps such as
 /// 0.1 are not binary numbers, and the quotient of two of them is off by a few units in the last place of at most
 /// [`MAX_VIEWS`], that is by less than 1e-11.
@@ -31,8 +34,8 @@ impl Angles {
         if degrees.len() > MAX_VIEWS {
             return Err(too_many(degrees.len() as f64));
         }
-        match degrees.iter().find(|angle| !angle.is_finite()) {
-            Some(angle) => Err(format!("{angle} is not a finite angle; give degrees")),
+        match degrees.iter().find(|angle| angle.is_nan() || angle.abs() > MAX_DEG) {
+            Some(angle) => Err(format!("{angle} is no angle of up to {MAX_DEG} degrees; give degrees")),
             None => Ok(Self(degrees)),
         }
     }

@@ -17,14 +17,29 @@ pub(crate) struct Kind {
     pub if_too_large: &'static str,
 }
 
+/// Opens the regular file at `path`, to be read as what `name` says, in the singular and without article.
+///
+/// # Errors
+/// What the file system says; named pipes, devices and folders.
+pub(crate) fn open(path: &Path, name: &str) -> Result<File> {
+    let refused = |source| Error::io("read", path, source);
+    // Asked before opening: opening a named pipe would wait for its other end.
+    if !std::fs::metadata(path).map_err(refused)?.is_file() {
+        return Err(Error::input(
+            path.display().to_string(),
+            "this is not a regular file",
+            format!("give the path of a {name}"),
+        ));
+    }
+    File::open(path).map_err(refused)
+}
+
 /// The bytes of the regular file at `path`.
 ///
 /// # Errors
 /// What the file system says; named pipes, devices and folders, which may have no end; files larger than the kind's limit.
 pub(crate) fn read(path: &Path, kind: Kind) -> Result<Vec<u8>> {
     let refused = |source| Error::io("read", path, source);
-    // Asked before opening: opening a named pipe would wait for its other end.
-    let about = std::fs::metadata(path).map_err(refused)?;
     let too_large = || {
         Error::input(
             path.display().to_string(),
@@ -32,21 +47,13 @@ pub(crate) fn read(path: &Path, kind: Kind) -> Result<Vec<u8>> {
             kind.if_too_large,
         )
     };
-    if !about.is_file() {
-        return Err(Error::input(
-            path.display().to_string(),
-            "this is not a regular file",
-            format!("give the path of a {}", kind.name),
-        ));
-    }
-    if about.len() > kind.max_bytes {
+    let file = open(path, kind.name)?;
+    if file.metadata().map_err(refused)?.len() > kind.max_bytes {
         return Err(too_large());
     }
     // A file that grows meanwhile, or whose size the system does not tell, is cut at the limit, too.
     let mut bytes = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(kind.max_bytes.saturating_add(1)).read_to_end(&mut bytes))
-        .map_err(refused)?;
+    file.take(kind.max_bytes.saturating_add(1)).read_to_end(&mut bytes).map_err(refused)?;
     if bytes.len() as u64 > kind.max_bytes { Err(too_large()) } else { Ok(bytes) }
 }
 

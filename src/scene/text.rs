@@ -6,7 +6,7 @@ use miette::NamedSource;
 use serde::de::DeserializeOwned;
 use toml::de::{DeTable, DeValue};
 
-use crate::error::{Error, SceneError};
+use crate::error::{Error, SceneError, legible};
 
 /// A TOML document with its name, kept for error messages.
 #[derive(Clone, Debug)]
@@ -74,7 +74,7 @@ impl SceneText {
         label: impl Into<String>,
         remedy: Option<String>,
     ) -> Error {
-        let mut message = shortened(message.into());
+        let mut message = shortened(legible(&message.into()));
         let span = span.filter(|span| {
             let can_be_shown = self.can_show(span);
             if !can_be_shown {

@@ -1,6 +1,8 @@
 //! What several test files need: scenes as text, and readers that know nothing of the writers.
 #![allow(dead_code)]
 
+pub mod run;
+
 use std::path::Path;
 
 use chordfield::scene::{Folder, Scene, SceneText};

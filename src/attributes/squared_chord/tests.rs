@@ -1,5 +1,6 @@
 //! The contract, over shapes that are the model's best and worst cases; and the laws of trees.
 
+mod hard;
 mod shapes;
 
 use glam::{DMat3, DVec3};

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{BeamArgs, KeepArgs, MethodArg, MethodArgs, SourceArgs, numbers};
+use super::parse::numbers;
+use super::{BeamArgs, KeepArgs, MethodArg, MethodArgs, SourceArgs};
 use crate::modes::audit::DEFAULT_TOLERANCE_MM;
 
 /// `audit`.

@@ -3,11 +3,12 @@
 //!
 //! All is done for as many faces at a time as the machine's instructions take: one list for each number of a face.
 
-use super::face::{Care, Slope, greater, lesser};
+use super::face::{Care, Slope};
 use super::patches::{MOST_FACES, MOST_POINTS, Patch};
 use super::pixels::Pixels;
 use super::projection::{Place, Projection};
-use super::round;
+use crate::exact::round;
+use crate::geometry::numeric::{greater, lesser};
 
 /// As many as a byte can number.
 const POINTS: usize = 256;
@@ -92,9 +93,16 @@ impl Aspect {
         }
     }
 
-    /// Looks at the faces of the patch whose points have places, and lists those that may cover pixels of a block.
+    /// Looks at the faces of the patch whose points have places, and lists those that may cover pixels of a block; and at their
+    /// edges, if asked.
     #[inline(always)]
-    pub fn look_at_faces(&mut self, patch: &Patch, block: &Pixels, care: Care, limits: [f64; 2]) {
+    pub fn look_at_faces<const EDGES: bool>(
+        &mut self,
+        patch: &Patch,
+        block: &Pixels,
+        care: Care,
+        limits: [f64; 2],
+    ) {
         for (face, corners) in patch.corners.iter().enumerate() {
             for (of_corner, &point) in self.corners.iter_mut().zip(corners) {
                 for (of, points) in of_corner.iter_mut().zip(&self.points) {
@@ -104,7 +112,9 @@ impl Aspect {
         }
         self.find_boxes(block);
         self.find_slopes(care, limits);
-        self.find_edges();
+        if EDGES {
+            self.find_edges();
+        }
         self.near_count = 0;
         for face in 0..patch.corners.len() {
             self.near[self.near_count] = face as u8;

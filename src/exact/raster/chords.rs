@@ -23,7 +23,7 @@ use crate::geometry::{RayGrid, Upstream};
 
 /// Pixels of the body's rectangle for each face, at most. Where faces cover more, quotients at once are quicker than depths that
 /// are gone through again.
-pub const MOST_PIXELS: usize = 64;
+pub const MOST_PIXELS: usize = 32;
 
 /// Stands for no depth: those are no less than 0. Alike for both ways, so that the length between is 0.
 const UNSET: f64 = -1.0;
@@ -97,16 +97,20 @@ impl Tracer<'_, '_> {
         block: &Pixels,
         record: &mut R,
     ) {
-        self.block.depths.begin(block);
-        self.each_face::<CONE>(block, |tracer, face| tracer.mark(simd, face, block));
-        if !self.block.edge_on.is_empty() {
-            edge_on::sort(&mut self.block.edge_on);
-            for e in &self.block.edge_on {
-                self.block.depths.unset(e.row, e.column);
+        self.work.block.depths.begin(block);
+        self.each_face::<CONE, true>(
+            block,
+            #[inline(always)]
+            |tracer, face| tracer.mark(simd, face, block),
+        );
+        if !self.work.block.edge_on.is_empty() {
+            edge_on::sort(&mut self.work.block.edge_on);
+            for e in &self.work.block.edge_on {
+                self.work.block.depths.unset(e.row, e.column);
             }
             self.trace_edge_on(record);
         }
-        if std::mem::take(&mut self.block.depths.is_any_set) {
+        if std::mem::take(&mut self.work.block.depths.is_any_set) {
             self.report_chords::<CONE, R>(block, record);
         }
     }
@@ -115,10 +119,10 @@ impl Tracer<'_, '_> {
     #[inline(always)]
     fn mark<S: Simd>(&mut self, simd: S, face: &SeenFace, block: &Pixels) {
         let slope = self.slope_of(face, block);
-        self.block.depths.is_any_set = true;
-        let pixels = self.aspect.pixels(face.face);
+        self.work.block.depths.is_any_set = true;
+        let pixels = self.work.aspect.pixels(face.face);
         let is_small = pixels.columns.len() as i32 <= SMALL && pixels.rows.len() as i32 <= SMALL;
-        if is_small && self.aspect.is_sure(face.face) {
+        if is_small && self.work.aspect.is_sure(face.face) {
             self.mark_small(simd, face, &slope, &pixels, block);
         } else {
             self.mark_rows(simd, face, &slope, &pixels.intersection(block));
@@ -128,19 +132,19 @@ impl Tracer<'_, '_> {
     /// Marks rows of pixels, from edge to edge, but only `pixels`, which are in the block.
     #[inline(always)]
     fn mark_rows<S: Simd>(&mut self, simd: S, face: &SeenFace, slope: &Slope, pixels: &Pixels) {
-        let corners = [0, 1, 2].map(|corner| self.aspect.corner(face.face, corner));
-        let is_even = self.rows.find(simd, &corners, pixels, self.seen.crossing_error);
+        let corners = [0, 1, 2].map(|corner| self.work.aspect.corner(face.face, corner));
+        let is_even = self.work.rows.find(simd, &corners, pixels, self.seen.crossing_error);
         let is_right_out = is_even != self.seen.projection.is_mirrored();
         for (i, row) in pixels.rows.clone().enumerate() {
-            let Covered { start, count, is_long_left } = self.rows.covered(i);
+            let Covered { start, count, is_long_left } = self.work.rows.covered(i);
             if count <= 0 {
                 continue;
             }
             let of_row = slope.row(row);
             let way = if is_long_left == is_right_out { Way::Out } else { Way::In };
             let groups = (count as usize).div_ceil(S::F64_LANES);
-            let at = self.block.depths.at(way, row, start);
-            let depths = &mut self.block.depths.planes[at..at + groups * S::F64_LANES];
+            let at = self.work.block.depths.at(way, row, start);
+            let depths = &mut self.work.block.depths.planes[at..at + groups * S::F64_LANES];
             let mut lanes = simd.add_f64s(simd.splat_f64s(f64::from(start)), first_lanes(simd));
             let end = simd.splat_f64s(f64::from(start + count));
             for (group, old) in S::as_mut_simd_f64s(depths).0.iter_mut().enumerate() {
@@ -148,7 +152,7 @@ impl Tracer<'_, '_> {
                 let is_twice = set(simd, old, slope.depths(simd, of_row, lanes), is_before_end);
                 if is_any(simd, is_twice) {
                     let column = start + (group * S::F64_LANES) as i32;
-                    note_twice(simd, &mut self.block.edge_on, face.number, [column, row], is_twice);
+                    note_twice(simd, &mut self.work.block.edge_on, face.number, [column, row], is_twice);
                 }
                 lanes = simd.add_f64s(lanes, simd.splat_f64s(S::F64_LANES as f64));
             }
@@ -167,9 +171,9 @@ impl Tracer<'_, '_> {
     ) {
         let (left, first_row) = (pixels.columns.start, pixels.rows.start);
         let rows = first_row.max(block.rows.start)..pixels.rows.end.min(block.rows.end);
-        let is_positive = self.aspect.area(face.face) > 0.0;
+        let is_positive = self.work.aspect.area(face.face) > 0.0;
         let way = if is_positive != self.seen.projection.is_mirrored() { Way::Out } else { Way::In };
-        let edges = self.aspect.edges(face.face);
+        let edges = self.work.aspect.edges(face.face);
         let mut of_rows = [[0.0; LANES]; 3];
         for (of_rows, Edge { from, along }) in of_rows.iter_mut().zip(&edges) {
             for (height, of_row) in of_rows[..SMALL as usize].iter_mut().enumerate() {
@@ -204,13 +208,13 @@ impl Tracer<'_, '_> {
                     continue;
                 }
                 let depths = slope.depths(simd, slope.row(row), columns);
-                let at = self.block.depths.at(way, row, left + group);
-                let old = &mut self.block.depths.planes[at..at + S::F64_LANES];
+                let at = self.work.block.depths.at(way, row, left + group);
+                let old = &mut self.work.block.depths.planes[at..at + S::F64_LANES];
                 let old = &mut S::as_mut_simd_f64s(old).0[0];
                 let is_twice = set(simd, old, depths, simd.and_m64s(is_inside, is_in_block));
                 if is_any(simd, is_twice) {
                     let first = [left + group, row];
-                    note_twice(simd, &mut self.block.edge_on, face.number, first, is_twice);
+                    note_twice(simd, &mut self.work.block.edge_on, face.number, first, is_twice);
                 }
             }
         }
@@ -232,10 +236,10 @@ impl Tracer<'_, '_> {
         for row in block.rows.clone() {
             for start in block.columns.clone().step_by(RUN) {
                 let count = RUN.min((block.columns.end - start) as usize);
-                let at = self.block.depths.entry_at(row, start);
+                let at = self.work.block.depths.entry_at(row, start);
                 let ray = self.ray(row, start);
-                let plane = self.block.depths.plane;
-                let (first, second) = self.block.depths.planes.split_at_mut(plane);
+                let plane = self.work.block.depths.plane;
+                let (first, second) = self.work.block.depths.planes.split_at_mut(plane);
                 let (ins, outs) = (&mut first[at..at + count], &mut second[at..at + count]);
                 // By bits, as the greatest of many doubles is found one after the other.
                 let set = ins.iter().fold(0, |set, depth| set | (depth.to_bits() ^ UNSET.to_bits()));

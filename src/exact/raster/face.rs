@@ -18,8 +18,8 @@ use robust::{Coord, orient2d};
 
 use super::edge_on::THICKNESS;
 use super::projection::Place;
-use super::round;
-use crate::geometry::numeric::{DoubleDouble, gamma};
+use crate::exact::round;
+use crate::geometry::numeric::{DoubleDouble, gamma, greater, lesser};
 
 /// Where an edge crosses rows. Of its ends, the first is the lower.
 #[derive(Clone, Copy)]
@@ -191,16 +191,4 @@ impl Slope {
         // As `lesser` and `greater` choose: a depth that is not a number is the face's own.
         simd.max_f64s(simd.min_f64s(depths, simd.splat_f64s(self.highest)), simd.splat_f64s(self.lowest))
     }
-}
-
-/// The lesser of two, the second if the first is not a number; one instruction, which `f64::min` is not.
-#[inline(always)]
-pub fn lesser(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
-}
-
-/// The greater of two, the second if the first is not a number.
-#[inline(always)]
-pub fn greater(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
 }

@@ -12,8 +12,9 @@
 //! A vertex is rounded once, for all its faces, and what they cover is exact for its rounded place: a closed surface is
 //! seen as a closed complex of triangles, so that every ray goes in as often as out, whatever the pixels hit.
 //!
-//! Faces that lie together are seen as a patch (`patches`), or passed over as a whole. Where a convex
-//! body's faces are small, only the two depths of a pixel are kept, and its length is one quotient (`chords`).
+//! Faces that lie together are seen as a patch (`patches`), or passed over as a whole. A length in a convex body is one
+//! quotient of a pixel's two depths: where faces are small, those are kept by pixel (`chords`); where they are large, rows are
+//! cut where a face ends (`stretches`).
 //!
 //! Scan conversion with the usual fill rule (Pineda 1988, doi:10.1145/54852.378457), made exact as Shewchuk's adaptive
 //! predicates are: by a float where that can tell, by an exact sign where it cannot.
@@ -26,9 +27,9 @@ mod near;
 mod patches;
 mod pixels;
 mod projection;
-mod round;
 mod rows;
 mod seen;
+mod stretches;
 mod tracer;
 
 use std::borrow::Cow;
@@ -37,10 +38,11 @@ pub use patches::Patches;
 use pixels::Pixels;
 use projection::{Projection, Sight};
 use seen::Seen;
-use tracer::Tracer;
+use tracer::{Tracer, Workspaces};
 
 use super::bvh;
 use super::record::Record;
+use super::round;
 use crate::geometry::{Bounds, ClosedMesh, RayGrid, Region};
 
 /// A closed surface made ready for the rays of one grid.
@@ -55,6 +57,7 @@ pub struct RasterView<'a> {
     grid: RayGrid,
     form: Form<'a>,
     is_convex: bool,
+    workspaces: Workspaces,
 }
 
 #[derive(Clone, Debug)]
@@ -74,13 +77,13 @@ impl<'a> RasterView<'a> {
     /// Makes `surface` ready for `grid`.
     pub fn new(surface: &'a ClosedMesh, grid: &RayGrid) -> Self {
         let form = Form::new(surface, grid, || Cow::Owned(Patches::new(surface)));
-        Self { surface, grid: *grid, form, is_convex: false }
+        Self { surface, grid: *grid, form, is_convex: false, workspaces: Workspaces::default() }
     }
 
     /// As [`new`](Self::new), with the surface's patches at hand.
     pub fn of_patches(surface: &'a ClosedMesh, patches: &'a Patches, grid: &RayGrid) -> Self {
         let form = Form::new(surface, grid, || Cow::Borrowed(patches));
-        Self { surface, grid: *grid, form, is_convex: false }
+        Self { surface, grid: *grid, form, is_convex: false, workspaces: Workspaces::default() }
     }
 
     /// The same for a surface that is convex but for rounding: its rays go in and out once, which is quicker

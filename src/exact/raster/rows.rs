@@ -5,8 +5,8 @@ use pulp::Simd;
 use super::face::{Edge, order};
 use super::pixels::Pixels;
 use super::projection::Place;
-use super::round;
 use super::tracer::BLOCK_ROWS;
+use crate::exact::round;
 
 /// No instructions handle more numbers side by side.
 pub const LANES: usize = 8;

@@ -10,8 +10,8 @@ use super::near::Cut;
 use super::patches::Patches;
 use super::pixels::Pixels;
 use super::projection::{Projection, Sight};
-use super::round;
 use super::{chords, edge_on};
+use crate::exact::round;
 use crate::geometry::numeric::gamma;
 use crate::geometry::{ClosedMesh, RayGrid, Upstream};
 

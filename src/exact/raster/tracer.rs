@@ -4,6 +4,7 @@
 //! faces cover is then a list without gaps, gone through without a surprise at each face.
 
 use std::ops::Range;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::RasterView;
 use super::aspect::Aspect;
@@ -15,6 +16,7 @@ use super::pixels::Pixels;
 use super::projection::Place;
 use super::rows::{Covered, Rows};
 use super::seen::Seen;
+use super::stretches::{self, Stretches};
 use crate::exact::record::{Record, Way};
 use crate::geometry::Region;
 
@@ -30,11 +32,49 @@ pub struct Tracer<'v, 'a> {
     pub view: &'v RasterView<'a>,
     pub seen: &'v Seen<'a>,
     asked: Pixels,
+    pub work: Box<Workspace>,
+}
+
+/// What a tracer writes to. It may serve another afterwards.
+#[derive(Default)]
+pub struct Workspace {
     pub block: Block,
     pub aspect: Aspect,
     pub rows: Rows,
+    pub stretches: Stretches,
     /// Patches near a row of blocks, and near a block.
     near: [Vec<u32>; 2],
+}
+
+/// Workspaces that no tracer uses: to make them anew for each tile would take as long as a part of the tile.
+#[derive(Default)]
+pub struct Workspaces(Mutex<Vec<Box<Workspace>>>);
+
+impl Workspaces {
+    fn take(&self) -> Box<Workspace> {
+        self.lock().pop().unwrap_or_default()
+    }
+
+    fn give_back(&self, workspace: Box<Workspace>) {
+        self.lock().push(workspace);
+    }
+
+    /// Lists are whole whatever happens to those who hold the lock.
+    fn lock(&self) -> MutexGuard<'_, Vec<Box<Workspace>>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Clone for Workspaces {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl std::fmt::Debug for Workspaces {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("Workspaces").field(&self.lock().len()).finish()
+    }
 }
 
 /// A tracer at work.
@@ -57,7 +97,7 @@ impl<R: Record> pulp::WithSimd for Widely<'_, '_, '_, R> {
 pub struct Block {
     /// Of the rays, mm.
     lengths: Vec<f64>,
-    faces: Vec<Face>,
+    pub faces: Vec<Face>,
     /// The first `span_count` are in use.
     spans: Vec<Span>,
     span_count: usize,
@@ -79,19 +119,38 @@ pub struct SeenFace {
 }
 
 /// A face whose spans are listed.
-struct Face {
-    slope: Slope,
-    number: u32,
+pub struct Face {
+    pub slope: Slope,
+    pub number: u32,
 }
 
 /// The pixels of a row that a face covers, each end reckoned in the block's columns.
 #[derive(Clone, Copy, Default)]
-struct Span {
-    face: u32,
-    row: i32,
-    start: i16,
-    end: i16,
-    is_out: bool,
+pub struct Span {
+    pub face: u32,
+    pub row: i32,
+    pub start: i16,
+    pub end: i16,
+    pub is_out: bool,
+}
+
+impl Block {
+    /// What faces cover.
+    #[inline(always)]
+    pub fn spans(&self) -> &[Span] {
+        &self.spans[..self.span_count]
+    }
+}
+
+/// How the rays of a block are traced.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum By {
+    /// Any body: each crossing by itself.
+    Crossings,
+    /// A convex body of small faces seen from without: see `chords`.
+    Chords,
+    /// One of large faces: see `stretches`.
+    Stretches,
 }
 
 impl<'v, 'a> Tracer<'v, 'a> {
@@ -99,48 +158,53 @@ impl<'v, 'a> Tracer<'v, 'a> {
         // A grid of more than 2³⁰ columns or rows is not seen.
         let pixels = |range: &Range<u32>| range.start as i32..range.end as i32;
         let asked = Pixels { columns: pixels(&region.columns), rows: pixels(&region.rows) };
-        Self {
-            view,
-            seen,
-            asked,
-            block: Block::default(),
-            aspect: Aspect::default(),
-            rows: Rows::default(),
-            near: Default::default(),
-        }
+        Self { view, seen, asked, work: view.workspaces.take() }
     }
 
     /// Traces it all, with the widest instructions that the machine has. None of them changes a bit: every operation is
     /// rounded by itself.
-    pub fn trace(&mut self, record: &mut impl Record) {
-        crate::dispatch::arch().dispatch(Widely { tracer: self, record });
+    pub fn trace(mut self, record: &mut impl Record) {
+        crate::dispatch::arch().dispatch(Widely { tracer: &mut self, record });
+        self.view.workspaces.give_back(self.work);
     }
 
     #[inline(always)]
     fn trace_blocks<S: pulp::Simd, R: Record>(&mut self, simd: S, record: &mut R) {
-        let is_by_chords = self.view.is_convex && self.seen.is_fine && !R::ASKS_FACES;
+        let is_simple = self.view.is_convex && !self.seen.source_is_inside && !R::ASKS_FACES;
+        let by = match (is_simple, self.seen.is_fine) {
+            (true, true) => By::Chords,
+            (true, false) => By::Stretches,
+            (false, _) => By::Crossings,
+        };
+        let block_columns = if by == By::Stretches { stretches::BLOCK_COLUMNS } else { BLOCK_COLUMNS };
         let common = self.asked.intersection(&self.seen.bounds);
         for top in common.rows.clone().step_by(BLOCK_ROWS as usize) {
             let rows = top..(top + BLOCK_ROWS).min(common.rows.end);
-            let [near_rows, _] = &mut self.near;
+            let [near_rows, _] = &mut self.work.near;
             self.seen.list_near(
                 &Pixels { columns: common.columns.clone(), rows: rows.clone() },
                 None,
                 near_rows,
             );
-            for left in common.columns.clone().step_by(BLOCK_COLUMNS as usize) {
-                let columns = left..(left + BLOCK_COLUMNS).min(common.columns.end);
+            for left in common.columns.clone().step_by(block_columns as usize) {
+                let columns = left..(left + block_columns).min(common.columns.end);
                 let block = Pixels { columns, rows: rows.clone() };
-                let [near_rows, near] = &mut self.near;
+                let [near_rows, near] = &mut self.work.near;
                 self.seen.list_near(&block, Some(near_rows), near);
                 if near.is_empty() && !self.seen.source_is_inside {
                     continue;
                 }
-                match (is_by_chords, self.seen.projection.is_cone()) {
-                    (true, true) => self.trace_block_of_chords::<true, S, R>(simd, &block, record),
-                    (true, false) => self.trace_block_of_chords::<false, S, R>(simd, &block, record),
-                    (false, true) => self.trace_block::<true, S>(simd, &block, record),
-                    (false, false) => self.trace_block::<false, S>(simd, &block, record),
+                match (by, self.seen.projection.is_cone()) {
+                    (By::Chords, true) => self.trace_block_of_chords::<true, S, R>(simd, &block, record),
+                    (By::Chords, false) => self.trace_block_of_chords::<false, S, R>(simd, &block, record),
+                    (By::Stretches, true) => {
+                        self.trace_block_of_stretches::<true, S, R>(simd, &block, record)
+                    }
+                    (By::Stretches, false) => {
+                        self.trace_block_of_stretches::<false, S, R>(simd, &block, record)
+                    }
+                    (By::Crossings, true) => self.trace_block::<true, S>(simd, &block, record),
+                    (By::Crossings, false) => self.trace_block::<false, S>(simd, &block, record),
                 }
             }
         }
@@ -153,22 +217,20 @@ impl<'v, 'a> Tracer<'v, 'a> {
         block: &Pixels,
         record: &mut impl Record,
     ) {
-        self.block.faces.clear();
-        self.block.span_count = 0;
         self.cover::<CONE, S>(simd, block);
-        if self.block.span_count > 0 {
+        if self.work.block.span_count > 0 {
             self.measure_rays(block);
         }
-        if !self.block.edge_on.is_empty() {
-            edge_on::sort(&mut self.block.edge_on);
+        if !self.work.block.edge_on.is_empty() {
+            edge_on::sort(&mut self.work.block.edge_on);
             self.trace_edge_on(record);
         }
         if self.seen.source_is_inside {
             self.start_inside(block, record);
         }
         let mut t_mm = [0.0; RUN];
-        for span in &self.block.spans[..self.block.span_count] {
-            if self.block.edge_on.is_empty() {
+        for span in self.work.block.spans() {
+            if self.work.block.edge_on.is_empty() {
                 self.report::<CONE>(span, block, &mut t_mm, record);
             } else {
                 self.report_but_edge_on::<CONE>(span, block, &mut t_mm, record);
@@ -178,31 +240,32 @@ impl<'v, 'a> Tracer<'v, 'a> {
 
     /// Goes through the faces that may cover pixels of the block, and begins the list of rays to be traced by themselves with
     /// those that lie in the faces of patches on a line of pixels.
+    /// Their edges are found if asked for.
     #[inline(always)]
-    pub fn each_face<const CONE: bool>(
+    pub fn each_face<const CONE: bool, const EDGES: bool>(
         &mut self,
         block: &Pixels,
         mut each: impl FnMut(&mut Self, &SeenFace),
     ) {
-        self.block.edge_on.clear();
-        let near = std::mem::take(&mut self.near[1]);
+        self.work.block.edge_on.clear();
+        let near = std::mem::take(&mut self.work.near[1]);
         let seen = self.seen;
         // Of the whole way, from the source to the pixel: shares from 0 to 1.
         let limits = if CONE { [1.0, f64::INFINITY] } else { [0.0, 1.0] };
         for &patch_number in &near {
             let patch = seen.patches.get(patch_number as usize);
-            self.aspect.place_points(&patch, &seen.projection, seen.patches.are_places());
+            self.work.aspect.place_points(&patch, &seen.projection, seen.patches.are_places());
             let is_known = seen.sight(patch_number).is_on_a_line;
             if is_known {
                 self.look_along(&patch, block);
             }
-            self.aspect.look_at_faces(&patch, block, seen.care, limits);
-            for i in 0..self.aspect.near_count() {
-                let face = self.aspect.near(i);
+            self.work.aspect.look_at_faces::<EDGES>(&patch, block, seen.care, limits);
+            for i in 0..self.work.aspect.near_count() {
+                let face = self.work.aspect.near(i);
                 each(self, &SeenFace { face, number: patch.numbers[face], limits, is_known });
             }
         }
-        self.near[1] = near;
+        self.work.near[1] = near;
     }
 
     /// Lists the pixels on edge-on faces of the patch that is looked at.
@@ -210,35 +273,41 @@ impl<'v, 'a> Tracer<'v, 'a> {
     #[inline(never)]
     fn look_along(&mut self, patch: &Patch, block: &Pixels) {
         for (corners, &number) in patch.corners.iter().zip(patch.numbers) {
-            let places = corners.map(|corner| self.aspect.place_of_point(corner));
+            let places = corners.map(|corner| self.work.aspect.place_of_point(corner));
             if is_edge_on(places, self.seen.place_error) {
-                pixels_along(places, number, self.seen.place_error, block, &mut self.block.edge_on);
+                pixels_along(places, number, self.seen.place_error, block, &mut self.work.block.edge_on);
             }
         }
     }
 
     /// Lists the faces and what they cover.
     #[inline(always)]
-    fn cover<const CONE: bool, S: pulp::Simd>(&mut self, simd: S, block: &Pixels) {
-        self.each_face::<CONE>(block, |tracer, face| tracer.cover_by(simd, face, block));
+    pub fn cover<const CONE: bool, S: pulp::Simd>(&mut self, simd: S, block: &Pixels) {
+        self.work.block.faces.clear();
+        self.work.block.span_count = 0;
+        self.each_face::<CONE, false>(
+            block,
+            #[inline(always)]
+            |tracer, face| tracer.cover_by(simd, face, block),
+        );
     }
 
     #[inline(always)]
     fn cover_by<S: pulp::Simd>(&mut self, simd: S, face: &SeenFace, block: &Pixels) {
         let slope = self.slope_of(face, block);
-        let pixels = self.aspect.pixels(face.face).intersection(block);
-        let corners = [0, 1, 2].map(|corner| self.aspect.corner(face.face, corner));
-        let is_even = self.rows.find(simd, &corners, &pixels, self.seen.crossing_error);
+        let pixels = self.work.aspect.pixels(face.face).intersection(block);
+        let corners = [0, 1, 2].map(|corner| self.work.aspect.corner(face.face, corner));
+        let is_even = self.work.rows.find(simd, &corners, &pixels, self.seen.crossing_error);
         let is_right_out = is_even != self.seen.projection.is_mirrored();
-        let slot = self.block.faces.len() as u32;
-        let block_spans = &mut self.block;
+        let slot = self.work.block.faces.len() as u32;
+        let block_spans = &mut self.work.block;
         let needed = block_spans.span_count + pixels.rows.len();
         if block_spans.spans.len() < needed {
             block_spans.spans.resize(2 * needed, Span::default());
         }
         let mut count = block_spans.span_count;
         for (i, row) in pixels.rows.enumerate() {
-            let Covered { start, count: covered, is_long_left } = self.rows.covered(i);
+            let Covered { start, count: covered, is_long_left } = self.work.rows.covered(i);
             // Written in any case: that is faster than to ask whether there is something to write.
             block_spans.spans[count] = Span {
                 face: slot,
@@ -250,14 +319,14 @@ impl<'v, 'a> Tracer<'v, 'a> {
             count += usize::from(covered > 0);
         }
         block_spans.span_count = count;
-        self.block.faces.push(Face { slope, number: face.number });
+        self.work.block.faces.push(Face { slope, number: face.number });
     }
 
     /// The slope of a face.
     #[inline(always)]
     pub fn slope_of(&mut self, face: &SeenFace, block: &Pixels) -> Slope {
-        if self.aspect.is_sure(face.face) {
-            self.aspect.slope(face.face)
+        if self.work.aspect.is_sure(face.face) {
+            self.work.aspect.slope(face.face)
         } else {
             self.look_closely(face, block)
         }
@@ -269,13 +338,13 @@ impl<'v, 'a> Tracer<'v, 'a> {
     #[inline(never)]
     fn look_closely(&mut self, face: &SeenFace, block: &Pixels) -> Slope {
         let place_error = self.seen.place_error;
-        let places = [0, 1, 2].map(|corner| self.aspect.corner(face.face, corner));
+        let places = [0, 1, 2].map(|corner| self.work.aspect.corner(face.face, corner));
         if !face.is_known && is_edge_on(places, place_error) {
-            pixels_along(places, face.number, place_error, block, &mut self.block.edge_on);
+            pixels_along(places, face.number, place_error, block, &mut self.work.block.edge_on);
         }
         let (slope, is_right) = Slope::careful(places, self.seen.care, face.limits);
         if !is_right {
-            let pixels = self.aspect.pixels(face.face).intersection(block);
+            let pixels = self.work.aspect.pixels(face.face).intersection(block);
             self.list_covered(&places, face.number, &pixels);
         }
         slope
@@ -284,18 +353,18 @@ impl<'v, 'a> Tracer<'v, 'a> {
     /// Lists those of some pixels that a face covers.
     #[cold]
     fn list_covered(&mut self, corners: &[Place; 3], face: u32, pixels: &Pixels) {
-        self.rows.find_one_by_one(corners, pixels, self.seen.crossing_error);
+        self.work.rows.find_one_by_one(corners, pixels, self.seen.crossing_error);
         for (i, row) in pixels.rows.clone().enumerate() {
-            let Covered { start, count, .. } = self.rows.covered(i);
+            let Covered { start, count, .. } = self.work.rows.covered(i);
             let pixel = |column| EdgeOn { row, column, face };
-            self.block.edge_on.extend((start..start + count).map(pixel));
+            self.work.block.edge_on.extend((start..start + count).map(pixel));
         }
     }
 
     /// The lengths of the block's rays.
     #[inline(always)]
     fn measure_rays(&mut self, block: &Pixels) {
-        let (lengths, columns) = (&mut self.block.lengths, block.columns.len());
+        let (lengths, columns) = (&mut self.work.block.lengths, block.columns.len());
         lengths.resize(columns * block.rows.len(), 0.0);
         for (row, lengths) in block.rows.clone().zip(lengths.chunks_exact_mut(columns)) {
             measure(&self.view.grid, row, block.columns.start, lengths);
@@ -305,7 +374,7 @@ impl<'v, 'a> Tracer<'v, 'a> {
     /// Traces the rays that are to be traced by themselves.
     #[cold]
     pub fn trace_edge_on(&self, record: &mut impl Record) {
-        for e in &self.block.edge_on {
+        for e in &self.work.block.edge_on {
             let pixel = [e.column as u32, e.row as u32];
             self.view.trace_ray(self.ray(e.row, e.column), pixel, record);
         }
@@ -315,7 +384,7 @@ impl<'v, 'a> Tracer<'v, 'a> {
     #[cold]
     fn start_inside(&self, block: &Pixels, record: &mut impl Record) {
         for row in block.rows.clone() {
-            for column in block.columns.clone().filter(|&c| !is_listed(&self.block.edge_on, row, c)) {
+            for column in block.columns.clone().filter(|&c| !is_listed(&self.work.block.edge_on, row, c)) {
                 record.crossing(self.ray(row, column), 0.0, 0, Way::In);
             }
         }
@@ -336,11 +405,11 @@ impl<'v, 'a> Tracer<'v, 'a> {
         t_mm: &mut [f64; RUN],
         record: &mut impl Record,
     ) {
-        let Face { slope, number } = &self.block.faces[span.face as usize];
+        let Face { slope, number } = &self.work.block.faces[span.face as usize];
         let (start, end) = (span.start as usize, span.end as usize);
         let of_row = slope.row(span.row);
         let first = (span.row - block.rows.start) as usize * block.columns.len();
-        let lengths = &self.block.lengths[first + start..first + end];
+        let lengths = &self.work.block.lengths[first + start..first + end];
         let column = block.columns.start + i32::from(span.start);
         let ray = self.ray(span.row, column);
         let way = if span.is_out { Way::Out } else { Way::In };
@@ -375,7 +444,7 @@ impl<'v, 'a> Tracer<'v, 'a> {
     ) {
         let mut rest = *span;
         for column in span.start..span.end {
-            if is_listed(&self.block.edge_on, span.row, block.columns.start + i32::from(column)) {
+            if is_listed(&self.work.block.edge_on, span.row, block.columns.start + i32::from(column)) {
                 let part = Span { end: column, ..rest };
                 self.report::<CONE>(&part, block, t_mm, record);
                 rest.start = column + 1;

@@ -7,13 +7,13 @@
 //!   ray 3  ●──▶●──▶●──▶●
 //! ```
 //!
-//! What comes of it are seeds: faces from which the walk proper ([`Walker::pass_from`]) has no step to take, or hardly any. So nothing
-//! here need be exact.
+//! Every sign and every step is that of the walk proper ([`Walker::pass_from`]), so that where both faces of a line are found, and
+//! not near their edges, the way through them is what a walk would find, to the last bit. All else is left to it: lines that
+//! miss or are in doubt, and walks that take long; it begins where these got.
 
 use glam::DVec3;
 
-use super::{Face, Seeds, Walker, cross};
-use crate::exact::shear::Shear;
+use super::{Face, LineView, Pass, Seeds, Standing, Unsure, Walker, cross};
 
 /// Rays that are walked abreast.
 pub(super) const ABREAST: usize = 32;
@@ -29,63 +29,39 @@ const ROUND: [usize; 5] = [0, 1, 2, 0, 1];
 
 /// Walks under way.
 pub(super) struct Ranks {
-    frames: [Frame; ABREAST],
+    views: [LineView; ABREAST],
     standings: [Standing; WALKS],
     /// Numbers of the walks that are not there yet.
     walking: [u8; WALKS],
-}
-
-/// What places a vertex across a ray: products with its coordinates, and what is then added.
-#[derive(Clone, Copy, Default)]
-struct Frame {
-    by: [DVec3; 2],
-    offset: [f64; 2],
-}
-
-/// A face stood on, from one of its edges: as in the walk proper.
-#[derive(Clone, Copy, Default)]
-struct Standing {
-    corners: [[f64; 2]; 3],
-    sides: [f64; 3],
-    half_edge: u32,
+    /// Where the last steps led.
+    stepped: [u32; WALKS],
 }
 
 impl Default for Ranks {
     fn default() -> Self {
         Self {
-            frames: [Frame::default(); ABREAST],
+            views: [LineView::default(); ABREAST],
             standings: [Standing::default(); WALKS],
             walking: [0; WALKS],
+            stepped: [0; WALKS],
         }
     }
 }
 
-impl Frame {
-    #[inline(always)]
-    fn new(origin: DVec3, dir: DVec3) -> Self {
-        let by = Shear::of(origin, dir).rows_across();
-        Self { by, offset: by.map(|by| -by.dot(origin)) }
-    }
-
-    #[inline(always)]
-    fn place(&self, vertex: DVec3) -> [f64; 2] {
-        [0, 1].map(|i| self.by[i].dot(vertex) + self.offset[i])
-    }
-}
-
 impl Ranks {
-    /// Walks from these seeds to the entries and exits of rays (origins and directions), no more than [`ABREAST`], and leaves the
-    /// seeds where it got.
-    #[inline]
-    pub fn walk(&mut self, walker: &Walker, rays: &[Option<(DVec3, DVec3)>], seeds: &mut [Seeds]) {
+    /// Walks to the entries and exits of rays (origin, direction and seeds), no more than [`ABREAST`].
+    #[inline(always)]
+    pub fn walk(&mut self, walker: &Walker, rays: impl Iterator<Item = Option<(DVec3, DVec3, Seeds)>>) {
         let mut count = 0;
-        for (ray, (line, seeds)) in rays.iter().zip(&*seeds).enumerate() {
-            let Some((origin, dir)) = *line else { continue };
-            self.frames[ray] = Frame::new(origin, dir);
-            for (walk, face, sign) in [(2 * ray, seeds.entry, -1.0), (2 * ray + 1, seeds.exit, 1.0)] {
-                self.standings[walk] = Standing::on(walker, &self.frames[ray], face, sign);
+        for (i, (ray, view)) in rays.zip(&mut self.views).enumerate() {
+            let Some((origin, dir, seeds)) = ray else { continue };
+            *view = LineView::new(walker, origin, dir);
+            for (walk, face, sign) in [(2 * i, seeds.entry, -1.0), (2 * i + 1, seeds.exit, 1.0)] {
+                let standing = walker.stand_on(view, face, sign);
+                // Branches would not be foreseen.
                 self.walking[count] = walk as u8;
-                count += 1;
+                count += usize::from(standing.least() <= 0.0);
+                self.standings[walk] = standing;
             }
         }
         for _ in 0..MOST_STEPS {
@@ -94,36 +70,39 @@ impl Ranks {
             }
             let mut left = 0;
             for i in 0..count {
-                let walk = self.walking[i];
-                let (ray, sign) = (walk as usize / 2, if walk.is_multiple_of(2) { -1.0 } else { 1.0 });
-                let at = &mut self.standings[walk as usize];
-                let next = at.step(walker, &self.frames[ray], sign);
-                // There, or at the outline.
-                let is_there = at.least() > 0.0 || next.sides[0] + next.sides[1] + next.sides[2] <= 0.0;
-                self.walking[left] = walk;
-                left += usize::from(!is_there);
-                if !is_there {
-                    *at = next;
+                let walk = self.walking[i] as usize % WALKS;
+                let sign = if walk.is_multiple_of(2) { -1.0 } else { 1.0 };
+                let next = self.standings[walk].step(walker, &self.views[walk / 2], sign);
+                // At the outline it stays where it is.
+                let is_on = next.area() > 0.0;
+                self.walking[left] = walk as u8;
+                left += usize::from(is_on && next.least() <= 0.0);
+                if is_on {
+                    self.standings[walk] = next;
                 }
+                self.stepped[i] = next.half_edge;
             }
+            walker.read_faces(&self.stepped[..count]);
             count = left;
         }
-        for (ray, seeds) in seeds.iter_mut().enumerate().filter(|(ray, _)| rays[*ray].is_some()) {
-            seeds.entry = self.standings[2 * ray].half_edge / 4;
-            seeds.exit = self.standings[2 * ray + 1].half_edge / 4;
-        }
+    }
+
+    /// The way of one of the rays through the body, as of [`Walker::pass_from`], and the faces where its walks ended.
+    #[inline(always)]
+    pub fn pass(&self, walker: &Walker, ray: usize) -> (Result<Option<Pass>, Unsure>, Seeds) {
+        let (view, entry, exit) = (&self.views[ray], &self.standings[2 * ray], &self.standings[2 * ray + 1]);
+        let mut seeds = Seeds { entry: entry.face(), exit: exit.face() };
+        let is_found = entry.is_surely_pierced(view) && exit.is_surely_pierced(view);
+        let answer = if is_found {
+            walker.pass_through(view, seeds)
+        } else {
+            walker.pass_from(view.origin, view.dir, &mut seeds)
+        };
+        (answer, seeds)
     }
 }
 
 impl Standing {
-    #[inline(always)]
-    fn on(walker: &Walker, frame: &Frame, face: u32, sign: f64) -> Self {
-        let corners = walker.faces[face as usize].corners.map(|v| frame.place(walker.vertices[v as usize]));
-        let [a, b, c] = corners;
-        let sides = [sign * cross(a, b), sign * cross(b, c), sign * cross(c, a)];
-        Self { corners, sides, half_edge: 4 * face }
-    }
-
     #[inline(always)]
     fn least(&self) -> f64 {
         let [s0, s1, s2] = self.sides;
@@ -133,12 +112,12 @@ impl Standing {
 
     /// Steps over the edge that has the line farthest on its outer side.
     #[inline(always)]
-    fn step(&self, walker: &Walker, frame: &Frame, sign: f64) -> Self {
+    fn step(&self, walker: &Walker, view: &LineView, sign: f64) -> Self {
         let [s0, s1, s2] = self.sides;
         let edge = if s0 <= s1 && s0 <= s2 { 0 } else { 1 + usize::from(s2 < s1) };
         let Face { twins, apexes, .. } = &walker.faces[self.half_edge as usize / 4];
         let edge_of_face = ROUND[(self.half_edge as usize % 4 + edge).min(4)];
-        let apex = frame.place(walker.vertices[apexes[edge_of_face] as usize]);
+        let apex = walker.place(view, apexes[edge_of_face]);
         let (a, b) = (self.corners[ROUND[edge + 1]], self.corners[edge]);
         Self {
             corners: [a, b, apex],

@@ -56,7 +56,7 @@ pub struct Seeds {
     pub exit: u32,
 }
 
-/// A convex body made ready for walks: 76 bytes a face, and a table of seeds of up to half a megabyte.
+/// A convex body made ready for walks: 76 bytes a face, and a table of seeds of 16 bytes a face, up to two megabytes.
 #[derive(Clone, Debug)]
 pub struct Walker {
     faces: Vec<Face>,
@@ -176,6 +176,15 @@ impl Walker {
         Ok(chord.filter(|c| c.length() > 0.0).map(|chord| Pass { chord, entry_face, exit_face }))
     }
 
+    /// The way through two faces that the line surely pierces.
+    #[inline(always)]
+    fn pass_through(&self, view: &LineView, faces: Seeds) -> Result<Option<Pass>, Unsure> {
+        let start = self.crossing_of_plane(view, faces.entry, -1.0)?;
+        let chord = Interval::new(start, self.crossing_of_plane(view, faces.exit, 1.0)?);
+        let through = |chord| Pass { chord, entry_face: faces.entry, exit_face: faces.exit };
+        Ok(chord.filter(|c| c.length() > 0.0).map(through))
+    }
+
     /// The face pierced among those that look along the line (`sign` 1) or against it (−1), walking from `at`. `None` if
     /// the line passes outside the outline. `last` becomes the face where the walk ends.
     #[inline(never)]
@@ -275,6 +284,7 @@ impl Walker {
 }
 
 /// A line as the walk sees it.
+#[derive(Clone, Copy, Default)]
 struct LineView {
     shear: Shear,
     origin: DVec3,
@@ -311,7 +321,7 @@ impl LineView {
 }
 
 /// A face walked on, from one of its edges.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Standing {
     /// 4 · face + the edge that the corners and sides are counted from.
     half_edge: u32,

@@ -12,9 +12,11 @@
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
+use super::abreast::ABREAST;
 use super::{Face, LineView, Seeds, Walker};
-use crate::geometry::numeric::gamma;
-use crate::geometry::{Bounds, ball_of_inertia};
+use crate::exact::round;
+use crate::geometry::numeric::{gamma, greater, lesser};
+use crate::geometry::{Bounds, Segment, ball_of_inertia};
 
 /// A table of faces by direction from the middle.
 #[derive(Clone, Debug)]
@@ -38,8 +40,16 @@ struct Seed {
     radius: f32,
 }
 
-/// The table has a cell for some two faces, and no more than a second-level cache holds.
-const LARGEST_SIDE: usize = 256;
+impl Seed {
+    /// Whether the surface is about where a ball of radius 1 is.
+    #[inline(always)]
+    fn is_near_ball(&self) -> bool {
+        (f64::from(self.radius) - 1.0).abs() <= RADIUS_TOLERANCE
+    }
+}
+
+/// The table has two cells for each face, so that most walks are of a step or none, up to two megabytes.
+const LARGEST_SIDE: usize = 512;
 const SMALLEST_SIDE: usize = 4;
 
 /// A face seen less edge-on than this looks along a line whatever the rounding.
@@ -67,7 +77,7 @@ impl SeedTable {
 
     /// The table of a body.
     pub fn new(walker: &Walker) -> Self {
-        let side = (walker.faces.len() / 2).isqrt().clamp(SMALLEST_SIDE, LARGEST_SIDE);
+        let side = (walker.faces.len() * 2).isqrt().clamp(SMALLEST_SIDE, LARGEST_SIDE);
         let bounds = Bounds::of(walker.vertices.iter().copied());
         let corners = walker.faces.iter().map(|face| face.corners.map(|v| walker.vertices[v as usize]));
         let (middle, to_ball) = ball_of_inertia(corners, bounds);
@@ -118,10 +128,17 @@ impl SeedTable {
                 self.cell(foot + (sign * half.sqrt()) * d)
             };
             let first = at(1.0);
-            let radius = f64::from(first.radius);
-            if (radius - 1.0).abs() > RADIUS_TOLERANCE { at(radius).face } else { first.face }
+            if first.is_near_ball() { first.face } else { at(f64::from(first.radius)).face }
         };
         Some(Seeds { entry: crossing(-1.0), exit: crossing(1.0) })
+    }
+
+    /// As [`near`](Self::near), for many lines, as many at a time as the machine's instructions take. Lines that surely miss have
+    /// no seeds.
+    #[inline]
+    pub fn near_all(&self, rays: &[Segment], found: &mut [Option<Seeds>; ABREAST]) {
+        found.fill(None);
+        crate::dispatch::arch().dispatch(NearAll { table: self, rays, found });
     }
 
     /// Whether the line from `o` along `d`, mm, passes the ball by that holds the body, and so misses, surely.
@@ -151,6 +168,66 @@ impl SeedTable {
         let (x, y) = (((x * size) as usize).min(self.side - 1), ((y * size) as usize).min(self.side - 1));
         self.cells[y * self.side + x]
     }
+}
+
+/// A look for the seeds of many lines.
+struct NearAll<'t> {
+    table: &'t SeedTable,
+    rays: &'t [Segment],
+    found: &'t mut [Option<Seeds>; ABREAST],
+}
+
+/// A number of each line.
+type OfLines = [f64; ABREAST];
+
+impl pulp::WithSimd for NearAll<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        const NONE: OfLines = [0.0; ABREAST];
+        let Self { table, rays, found } = self;
+        let (mut origins, mut dirs) = ([NONE; 3], [NONE; 3]);
+        for (i, ray) in rays.iter().take(ABREAST).enumerate() {
+            let (o, d) = (ray.line().origin(), ray.line().dir());
+            (origins[0][i], origins[1][i], origins[2][i]) = (o.x, o.y, o.z);
+            (dirs[0][i], dirs[1][i], dirs[2][i]) = (d.x, d.y, d.z);
+        }
+        let (mut over, mut cells) = (NONE, [NONE; 2]);
+        let last = table.side as f64 - 1.0;
+        for i in 0..ABREAST {
+            let o = table.to_ball * (DVec3::new(origins[0][i], origins[1][i], origins[2][i]) - table.middle);
+            let d = table.to_ball * DVec3::new(dirs[0][i], dirs[1][i], dirs[2][i]);
+            let inverse = 1.0 / d.length_squared();
+            let foot = o - (o.dot(d) * inverse) * d;
+            let offset_squared = foot.length_squared();
+            over[i] = offset_squared - (table.holding_squared + PASSING_BY * o.length_squared());
+            let half = (greater(1.0 - offset_squared, table.inset * table.inset) * inverse).sqrt();
+            for (cells, sign) in cells.iter_mut().zip([-half, half]) {
+                let [x, y] = flattened(foot + sign * d);
+                let cell = |place: f64| lesser(greater(floor(place * (last + 1.0)), 0.0), last);
+                cells[i] = round::WHOLE + (cell(y) * (last + 1.0) + cell(x));
+            }
+        }
+        for (i, ray) in rays.iter().take(ABREAST).enumerate() {
+            let seed = |cells: &OfLines| table.cells[round::whole(cells[i]) as usize];
+            let (entry, exit) = (seed(&cells[0]), seed(&cells[1]));
+            if over[i] > 0.0 {
+                continue;
+            }
+            found[i] = if entry.is_near_ball() && exit.is_near_ball() {
+                Some(Seeds { entry: entry.face, exit: exit.face })
+            } else {
+                table.near(ray.line().origin(), ray.line().dir())
+            };
+        }
+    }
+}
+
+/// The greatest integer that is surely not greater, but for numbers all but integers.
+#[inline(always)]
+fn floor(x: f64) -> f64 {
+    ((x - 0.5) + round::WHOLE) - round::WHOLE
 }
 
 /// The face through which the ray from a point within the body leaves: by a walk from a face nearby that looks along it, or

@@ -2,8 +2,6 @@
 
 use std::hint::black_box;
 
-use glam::DVec3;
-
 use super::abreast::{ABREAST, Ranks};
 use super::held::{Alone, Followers, Holding};
 use super::{Pass, Seeds, Unsure, Walker};
@@ -13,7 +11,7 @@ use crate::geometry::{Interval, RayGrid, Region, Segment, Upstream};
 /// Bodies of fewer faces stay in the second-level cache, where reading ahead gains nothing.
 const FACES_IN_CACHE: usize = 10_000;
 
-/// Over bodies of as many faces walks wait for memory, and are quicker abreast.
+/// Over bodies of as many faces walks wait for memory.
 const MANY_FACES: usize = 80_000;
 
 /// Bodies of as many faces have none that serves many rays of an image.
@@ -36,7 +34,7 @@ impl Walker {
             Upstream::Source(source) if is_coarse => {
                 self.trace_rows(grid, region, record, other, &mut Followers::new(source));
             }
-            _ if self.faces.len() < MANY_FACES || region.rows.len() < WORTH_IT => {
+            _ if region.rows.len() < WORTH_IT => {
                 self.trace_rows(grid, region, record, other, &mut Alone);
             }
             _ => self.trace_rows_abreast(grid, region, record, other),
@@ -56,7 +54,7 @@ impl Walker {
             let rows = top..region.rows.end.min(top + ABREAST as u32);
             let (mut seeds, mut has_missed) = ([None; ABREAST], [true; ABREAST]);
             for column in region.columns.clone() {
-                let (mut lines, mut of_lines) = ([None; ABREAST], [FIRST; ABREAST]);
+                let mut lines = [None; ABREAST];
                 for (j, row) in rows.clone().enumerate() {
                     let target = grid.point(column, row);
                     let origin = grid.start_of(target);
@@ -65,16 +63,16 @@ impl Walker {
                     if has_missed[j] && self.seeds.passes_by(origin, dir) {
                         continue;
                     }
-                    of_lines[j] = seeds[j].unwrap_or_else(|| self.seeds.near(origin, dir).unwrap_or(FIRST));
-                    lines[j] = Some((origin, dir));
+                    let near = seeds[j].unwrap_or_else(|| self.seeds.near(origin, dir).unwrap_or(FIRST));
+                    lines[j] = Some((origin, dir, near));
                 }
-                ranks.walk(self, &lines[..rows.len()], &mut of_lines[..rows.len()]);
+                ranks.walk(self, lines[..rows.len()].iter().copied());
                 for (j, row) in rows.clone().enumerate() {
-                    let Some((origin, dir)) = lines[j] else { continue };
+                    let Some((_, dir, _)) = lines[j] else { continue };
                     let ray = (row - region.rows.start) as usize * region.columns.len()
                         + (column - region.columns.start) as usize;
-                    let answer = self.pass_from(origin, dir, &mut of_lines[j]);
-                    (seeds[j], has_missed[j]) = (Some(of_lines[j]), answer == Ok(None));
+                    let (answer, ended) = ranks.pass(self, j);
+                    (seeds[j], has_missed[j]) = (Some(ended), answer == Ok(None));
                     match answer {
                         Ok(Some(pass)) => note(record, ray, &pass, UNIT, dir.length()),
                         Ok(None) => {}
@@ -143,23 +141,17 @@ impl Walker {
         record: &mut R,
         mut other: impl FnMut(usize, &Segment, &mut R),
     ) {
-        let mut ranks = Ranks::default();
+        let (mut ranks, mut near) = (Ranks::default(), [None; ABREAST]);
         for (i, rays) in rays.chunks(ABREAST).enumerate() {
-            let (mut seeds, mut lines) = ([FIRST; ABREAST], [None; ABREAST]);
-            for ((seeds, line), ray) in seeds.iter_mut().zip(&mut lines).zip(rays) {
-                let (origin, dir) = (ray.line().origin(), ray.line().dir());
-                if let Some(near) = self.seeds.near(origin, dir) {
-                    (*seeds, *line) = (near, Some((origin, dir)));
-                }
-            }
-            self.touch(&lines[..rays.len()], &seeds);
-            if self.faces.len() >= MANY_FACES {
-                ranks.walk(self, &lines[..rays.len()], &mut seeds[..rays.len()]);
-            }
-            for (j, ((seeds, line), ray)) in seeds.iter_mut().zip(lines).zip(rays).enumerate() {
-                let Some((origin, dir)) = line else { continue };
+            self.seeds.near_all(rays, &mut near);
+            self.touch(&near[..rays.len()]);
+            let of_ray = |(ray, near): (&Segment, &Option<Seeds>)| {
+                near.map(|seeds| (ray.line().origin(), ray.line().dir(), seeds))
+            };
+            ranks.walk(self, rays.iter().zip(&near).map(of_ray));
+            for (j, ray) in rays.iter().enumerate().filter(|(j, _)| near[*j].is_some()) {
                 let number = first + i * ABREAST + j;
-                match self.pass_from(origin, dir, seeds) {
+                match ranks.pass(self, j).0 {
                     Ok(Some(pass)) => note(record, number, &pass, ray.reach(), 1.0),
                     Ok(None) => {}
                     Err(Unsure) => other(number, ray, record),
@@ -170,19 +162,28 @@ impl Walker {
 
     /// Reads what the walks will begin with: many reads that do not wait for each other, where each walk would wait for its
     /// own.
-    fn touch(&self, lines: &[Option<(DVec3, DVec3)>], seeds: &[Seeds]) {
+    fn touch(&self, seeds: &[Option<Seeds>]) {
         if self.faces.len() < FACES_IN_CACHE {
             return;
         }
         let faces = || {
-            let used = lines.iter().zip(seeds).filter(|(line, _)| line.is_some());
-            used.flat_map(|(_, s)| [&self.faces[s.entry as usize], &self.faces[s.exit as usize]])
+            let used = seeds.iter().flatten();
+            used.flat_map(|s| [&self.faces[s.entry as usize], &self.faces[s.exit as usize]])
         };
         black_box(faces().fold(0, |sum: u32, face| sum.wrapping_add(face.corners[0])));
         let corners = faces().flat_map(|face| face.corners);
         black_box(
             corners.fold(0, |sum: u64, corner| sum.wrapping_add(self.vertices[corner as usize].x.to_bits())),
         );
+    }
+
+    /// The same of the faces that walks have come to (4 · face and more).
+    #[inline]
+    pub(super) fn read_faces(&self, half_edges: &[u32]) {
+        if self.faces.len() >= MANY_FACES {
+            let faces = half_edges.iter().map(|half_edge| &self.faces[*half_edge as usize / 4]);
+            black_box(faces.fold(0, |sum: u32, face| sum.wrapping_add(face.corners[0])));
+        }
     }
 }
 

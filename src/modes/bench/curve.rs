@@ -32,13 +32,24 @@ pub struct CurveSettings {
     pub limit_s: f64,
 }
 
+const TOLERANCES_MM: &[f64] = &[5.0, 2.0, 0.5, 0.1, 0.02];
+
+/// The range of the paper's Figure 5.
+const DISTANCE_THRESHOLDS: &[f64] = &[0.25, 0.1, 0.05, 0.025, 0.01];
+
 impl CurveSettings {
-    /// All methods: trees of squared chords at a range of tolerances, the paper's at its range of thresholds.
-    pub fn contenders() -> Vec<Contender> {
+    /// All methods: trees of squared chords at a range of tolerances, the paper's at its range of thresholds; of both only
+    /// some if it is to be quick.
+    pub fn contenders(quick: bool) -> Vec<Contender> {
         let engines = [None, Some(Engine::Raster), Some(Engine::Walk), Some(Engine::Bvh), Some(Engine::Clip)];
         let exact = engines.into_iter().map(Contender::exact);
-        let tolerances = [5.0, 2.0, 0.5, 0.1, 0.02].map(Contender::tolerance);
-        let thresholds = [0.25, 0.1, 0.05, 0.025, 0.01].map(Contender::paper);
+        let (tolerances, thresholds): (&[f64], &[f64]) = if quick {
+            (&[2.0, 0.5, 0.1], &[0.25, 0.05, 0.01])
+        } else {
+            (TOLERANCES_MM, DISTANCE_THRESHOLDS)
+        };
+        let tolerances = tolerances.iter().copied().map(Contender::tolerance);
+        let thresholds = thresholds.iter().copied().map(Contender::paper);
         exact.chain(tolerances).chain(thresholds).collect()
     }
 }

@@ -26,7 +26,7 @@ use crate::exact::Engine;
 use crate::geometry::Region;
 use crate::physics::{Attenuator, PhotonNoise};
 use crate::scene::{Scene, View};
-pub use forest::kept::{KeepsTrees, Source};
+pub use forest::kept::{KeepsTrees, Source, TREES_BEGIN};
 pub use forest::{
     DEFAULT_TOLERANCE_MM, Demand, Estimate, ForestReport, Interpolation, QueryCounts, TreeSettings,
 };

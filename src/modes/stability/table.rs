@@ -22,6 +22,20 @@ pub fn table(found: &[Found]) -> String {
     text
 }
 
+/// In a sentence: how many rays were traced by each engine, how many of these were lost, and how many lengths disagree.
+pub fn totals(found: &[Found]) -> String {
+    let of = |engine, figure: fn(&Figures) -> u64| -> u64 {
+        found.iter().filter(|f| f.engine == engine).map(|f| figure(&f.figures)).sum()
+    };
+    let traced =
+        ENGINES.map(|engine| format!("{} by `{}`", of(engine, |f| f.rays), engine.name())).join(", ");
+    let all = |figure: fn(&Figures) -> u64| ENGINES.into_iter().map(|engine| of(engine, figure)).sum::<u64>();
+    let (lost, beyond, recomputed) = (all(|f| f.lost), all(|f| f.beyond), all(|f| f.recomputed));
+    format!(
+        "Rays traced: {traced}. Lost: {lost}. Disagree: {beyond}. Lengths recomputed in rationals: {recomputed}.\n"
+    )
+}
+
 fn part(text: &mut String, of: &str, rows: &[(&str, Vec<&Found>)]) {
     // Writing to a string cannot fail.
     let _ = writeln!(

@@ -94,15 +94,19 @@ const ERROR_HEADS: [&str; 14] = [
     "max",
 ];
 
+/// The tables' file names, without endings.
+pub const STEMS: [&str; 6] = ["cases", "case_organs", "fields", "field_organs", "histograms", "errors"];
+
 /// All tables: file names without endings, and texts.
-pub fn tables(report: &DoseReport, format: Format) -> Vec<(&'static str, String)> {
-    vec![
-        ("cases", cases(report, format)),
-        ("case_organs", organs(report, format, false)),
-        ("fields", fields(report, format)),
-        ("field_organs", organs(report, format, true)),
-        ("histograms", histograms(report, format)),
-        ("errors", errors(report, format)),
+pub fn tables(report: &DoseReport, format: Format) -> [(&'static str, String); 6] {
+    let [of_cases, of_case_organs, of_fields, of_field_organs, of_lengths, of_errors] = STEMS;
+    [
+        (of_cases, cases(report, format)),
+        (of_case_organs, organs(report, format, false)),
+        (of_fields, fields(report, format)),
+        (of_field_organs, organs(report, format, true)),
+        (of_lengths, histograms(report, format)),
+        (of_errors, errors(report, format)),
     ]
 }
 

@@ -29,6 +29,8 @@ pub use rows::Format;
 use super::{AtomicFile, json, write_atomically};
 use crate::error::{Error, Result};
 use crate::modes::dose::{DoseReport, Illustrations, Part, Shard};
+use crate::scene::regular_file;
+use crate::study::Study;
 
 /// The record's name.
 pub const RECORD: &str = "dose.json";
@@ -56,6 +58,31 @@ pub fn write(folder: &Path, report: &DoseReport, shown: &Illustrations, formats:
     Ok(())
 }
 
+/// Makes sure that no table takes the place of a file that the study reads, such as its list of paths, named `paths.csv` too.
+///
+/// # Errors
+/// The first such file.
+pub fn spare_inputs(folder: &Path, study_file: &Path, study: &Study) -> Result<()> {
+    // A folder that is not there yet holds nothing.
+    let Ok(folder) = folder.canonicalize() else { return Ok(()) };
+    let tables = Table::ALL.map(Table::stem).into_iter().chain(figures::STEMS);
+    let names: Vec<String> = tables.map(|stem| format!("{stem}.{}", Format::Csv.ending())).collect();
+    for input in study.inputs() {
+        let path = study_file.with_file_name(&input.file);
+        let Ok(real) = path.canonicalize() else { continue };
+        let is_target = real.parent() == Some(&folder)
+            && real.file_name().is_some_and(|name| names.iter().any(|table| name == table.as_str()));
+        if is_target {
+            return Err(Error::input(
+                path.display().to_string(),
+                "the study reads this file, and a table of that name would take its place",
+                "give another folder with --output",
+            ));
+        }
+    }
+    Ok(())
+}
+
 /// Where a part of a study lies.
 pub fn part_folder(folder: &Path, shard: Shard) -> PathBuf {
     let digits = shard.of().to_string().len();
@@ -77,10 +104,10 @@ pub fn write_part(folder: &Path, part: &Part) -> Result<()> {
 /// A record that cannot be read.
 pub fn read_part(folder: &Path) -> Result<Option<Part>> {
     let path = folder.join(SUMS);
-    let file = match std::fs::File::open(&path) {
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        opened => opened.map_err(|e| Error::io("read", &path, e))?,
-    };
+    if !path.exists() {
+        return Ok(None);
+    }
+    let file = regular_file::open(&path, "part's record")?;
     serde_json::from_reader(BufReader::new(file)).map(Some).map_err(|e| {
         Error::input(
             path.display().to_string(),
@@ -124,7 +151,7 @@ pub fn join_tables(folder: &Path, parts: &[PathBuf]) -> Result<Vec<String>> {
         for (index, part) in parts.iter().enumerate() {
             let path = part.join(&name);
             let refused = |e| Error::io("read", &path, e);
-            let mut rows = BufReader::with_capacity(1 << 20, std::fs::File::open(&path).map_err(refused)?);
+            let mut rows = BufReader::with_capacity(1 << 20, regular_file::open(&path, "part's table")?);
             if format == Format::Csv {
                 let mut head = Vec::new();
                 rows.read_until(b'\n', &mut head).map_err(refused)?;

@@ -23,7 +23,8 @@ use crate::exact::Body;
 use crate::ritree::kept::{RecordReader, RecordWriter};
 use crate::ritree::{Cache, Loaded, Parameters, Unreadable};
 
-const MAGIC: [u8; 16] = *b"chordfield trees";
+/// How files of trees begin.
+pub const TREES_BEGIN: [u8; 16] = *b"chordfield trees";
 
 /// To be raised with every change of the format, and of what becomes of a cell.
 const VERSION: u32 = 1;
@@ -173,7 +174,7 @@ pub fn save(forests: &[&Forest], out: &mut dyn Write) -> io::Result<()> {
     write_records(&mut length)?;
     let bytes = length.bytes;
     let mut tee = Tee { out, hash: Sha256::new(), bytes: 0 };
-    tee.write_all(&MAGIC)?;
+    tee.write_all(&TREES_BEGIN)?;
     tee.write_all(&VERSION.to_le_bytes())?;
     tee.write_all(&bytes.to_le_bytes())?;
     write_records(&mut tee)?;
@@ -222,9 +223,9 @@ fn whole(source: &mut dyn Source) -> Result<u64, Unreadable> {
         return refuse("is too short to hold trees".into());
     }
     source.read_exact(&mut head)?;
-    let (magic, numbers) = head.split_at(MAGIC.len());
+    let (magic, numbers) = head.split_at(TREES_BEGIN.len());
     let (version, length) = numbers.split_at(4);
-    if magic != MAGIC {
+    if magic != TREES_BEGIN {
         return refuse("is not a file of trees".into());
     }
     if version != VERSION.to_le_bytes() {
