@@ -195,6 +195,12 @@ impl Cell {
         std::array::from_fn(|a| 0.5 * (self.low[a] + self.high[a]))
     }
 
+    /// The point at fractions of each side, of which all 0 are the low corner and all ½ the middle.
+    pub fn at(&self, fractions: [f64; 4]) -> [f64; 4] {
+        let [low, high] = [self.low, self.high];
+        std::array::from_fn(|a| (1.0 - fractions[a]) * low[a] + fractions[a] * high[a])
+    }
+
     /// The longest side; the first of equal ones.
     pub fn longest_axis(&self) -> usize {
         let side = |a: usize| self.high[a] - self.low[a];

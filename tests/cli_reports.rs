@@ -89,6 +89,18 @@ fn tracing_writes_a_picture_its_map_and_a_record_that_tells_the_error() {
     let written = ["random-volumes-map.png", "random-volumes.json", "random-volumes.png"];
     assert_eq!(files(&folder.path().join("out")), written);
 
+    for speed_up in ["first_view", "warm"] {
+        assert!(record["exact"][speed_up]["speed_up"].as_f64().expect("a speed-up") > 0.0, "{record}");
+    }
+
+    let looked_through = [&small[..], &["--application", "absorption", "--compare", "--json"]].concat();
+    let record = summary(&chordfield(folder.path(), &looked_through));
+    assert_eq!(record["application"], "absorption");
+    assert!(record["exact"]["mean_length_error"].as_f64().expect("an error") < 0.1, "{record}");
+    assert!(folder.path().join("out/random-volumes-absorption.png").is_file());
+    let open_bodies = ["trace", "tomatoes", "--application", "absorption"];
+    assert!(err(&chordfield(folder.path(), &open_bodies)).contains("closed convex"));
+
     for (bad, words) in [
         (&["--samples", "5"][..], "--samples"),
         (&["--method", "walk"], "ritree"),

@@ -4,12 +4,12 @@ use std::marker::PhantomData;
 
 use super::lines::SurfaceLines;
 use super::memo::Memo;
-use super::surface::{Lights, Seen, blend, distance, f32s, vector};
+use super::surface::{LEVELS_SPARED, SECOND_LOOK, Seen, blend, distance, f32s, vector};
 use crate::geometry::{Ray, Real, Vec3};
 use crate::linespace::{Cell, LinePoint, PlanePair};
 use crate::ritree::Attribute;
-use crate::surface::Reach;
 use crate::surface::optics::{Optics, follow, reflected};
+use crate::surface::{Hit, Reach};
 
 /// The first hit of a line, and the ray that leaves the object at last: {normal, point, exit point, exit direction}.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,8 +24,23 @@ pub struct Through {
     pub exit_dir: [f32; 3],
 }
 
+/// A line's sample with the first hit that it was made of.
+pub type Known<R> = (Through, Option<Hit<R>>);
+
+/// The way of a ray that is not followed yet.
+const UNKNOWN: u32 = u32::MAX;
+
 impl Through {
     const MISS: Self = Self { seen: Seen::MISS, way: 0, exit_point: [0.0; 3], exit_dir: [0.0; 3] };
+
+    fn outline(seen: Seen) -> Self {
+        let way = if seen == Seen::MISS { 0 } else { UNKNOWN };
+        Self { seen, way, ..Self::MISS }
+    }
+
+    fn is_finished(&self) -> bool {
+        self.way != UNKNOWN
+    }
 
     /// How often the ray is turned.
     pub fn turns(&self) -> u32 {
@@ -39,6 +54,13 @@ impl Through {
     }
 }
 
+/// As [`LEVELS_SPARED`]. Samples of glass cost the most, and many of its discontinuities lie within its outline.
+const GLASS_LEVELS_SPARED: u32 = 4;
+
+/// How far along a ray a hit may lie from where its depth says, box units: depths of up to 1 are rounded to f32 along the
+/// axis, and rays are at most √3 times as long.
+const DEPTH_ROUNDING: f64 = 2.0 * f32::EPSILON as f64;
+
 /// How far a mirrored ray moves on what it shows, box units, by a unit turn of the normal: twice the turn, over the two and a
 /// half sides that it goes on. Measured on a waving sheet, it keeps pictures at the default threshold as true as the paper's.
 const LEVERAGE: f64 = 5.0;
@@ -47,19 +69,18 @@ const LEVERAGE: f64 = 5.0;
 ///
 /// Rays that are turned differently often, or leave by patches of different classes, are of different classes: between
 /// them the exit ray jumps.
-pub struct ExitRay<'a, L, R> {
+pub struct ExitRay<'a, R> {
     lines: SurfaceLines<'a>,
-    lights: L,
     optics: Optics,
     limit: u32,
-    memo: Memo<Through>,
+    memo: Memo<Known<R>>,
     number: PhantomData<R>,
 }
 
-impl<'a, L: Lights, R: Real> ExitRay<'a, L, R> {
+impl<'a, R: Real> ExitRay<'a, R> {
     /// The exit rays of a surface, after at most `limit` turns.
-    pub fn new(lines: SurfaceLines<'a>, lights: L, optics: Optics, limit: u32) -> Self {
-        Self { lines, lights, optics, limit, memo: Memo::default(), number: PhantomData }
+    pub fn new(lines: SurfaceLines<'a>, optics: Optics, limit: u32) -> Self {
+        Self { lines, optics, limit, memo: Memo::default(), number: PhantomData }
     }
 
     /// The surface's lines.
@@ -68,12 +89,53 @@ impl<'a, L: Lights, R: Real> ExitRay<'a, L, R> {
     }
 }
 
-impl<L: Lights, R: Real> Attribute for ExitRay<'_, L, R> {
+impl<R: Real> Attribute for ExitRay<'_, R> {
     type Output = Through;
     type Real = R;
 
     fn sample(&self, line: LinePoint) -> Through {
-        self.memo.recall(line, || self.trace(line))
+        let mut output = self.outline(line);
+        self.finish(line, &mut output);
+        output
+    }
+
+    /// The first hit.
+    fn outline(&self, line: LinePoint) -> Through {
+        let outline = || {
+            let (seen, hit) = Seen::along::<R>(&self.lines, line);
+            (Through::outline(seen), hit)
+        };
+        Through::outline(self.memo.recall(line, outline).0.seen)
+    }
+
+    fn outline_class(&self, output: &Through) -> u32 {
+        output.seen.class
+    }
+
+    fn levels_spared(&self) -> u32 {
+        match self.optics {
+            Optics::Mirror => LEVELS_SPARED,
+            Optics::Glass { .. } => GLASS_LEVELS_SPARED,
+        }
+    }
+
+    /// A mirror's first hit has the normal that its rays are turned at.
+    fn outline_within(&self, output: &Through) -> Option<Through> {
+        (self.optics == Optics::Mirror).then(|| Through::outline(output.seen))
+    }
+
+    fn is_told_by_outline(&self, output: &Through) -> bool {
+        self.is_plain_mirror(output)
+    }
+
+    fn finish(&self, line: LinePoint, output: &mut Through) {
+        if !output.is_finished() {
+            *output = match self.memo.get(&line) {
+                Some((known, _)) if known.is_finished() => known,
+                Some((_, hit)) => self.followed(line, output.seen, hit),
+                None => self.followed(line, output.seen, None),
+            };
+        }
     }
 
     fn class(&self, output: &Through) -> u32 {
@@ -114,9 +176,21 @@ impl<L: Lights, R: Real> Attribute for ExitRay<'_, L, R> {
         Through { seen, way: first.way, exit_point: f32s(point), exit_dir: f32s(dir.normalized()) }
     }
 
-    /// Of the exit ray.
+    /// Of the exit ray; of a plain mirror, the normal, which is what is interpolated: lines of many slopes may share it.
     fn direction(&self, output: &Through) -> Option<Vec3<R>> {
+        if self.is_plain_mirror(output) {
+            return Some(vector(output.seen.normal));
+        }
         (output.exit_dir != [0.0; 3]).then(|| vector(output.exit_dir))
+    }
+
+    /// A mirrored ray turns twice as far as the normal.
+    fn angular_share(&self) -> f64 {
+        if self.optics == Optics::Mirror { 0.5 } else { 1.0 }
+    }
+
+    fn second_look(&self) -> Option<[f64; 4]> {
+        Some(SECOND_LOOK)
     }
 
     fn is_certainly_empty(&self, pair: PlanePair, cell: &Cell) -> bool {
@@ -124,21 +198,28 @@ impl<L: Lights, R: Real> Attribute for ExitRay<'_, L, R> {
     }
 }
 
-impl<L: Lights, R: Real> ExitRay<'_, L, R> {
-    fn trace(&self, line: LinePoint) -> Through {
+impl<R: Real> ExitRay<'_, R> {
+    /// The whole sample of a line whose first hit is known, or is found again where it must be.
+    fn followed(&self, line: LinePoint, seen: Seen, hit: Option<Hit<R>>) -> Through {
         let ray = self.lines.ray::<R>(line);
         let surface = self.lines.surface();
-        let Some(hit) = surface.hit(&ray, Reach::whole()) else { return Through::MISS };
+        let again = || {
+            let t = self.lines.distance_to(R::of(seen.depth.into()), &ray, line.pair);
+            let room = R::of(DEPTH_ROUNDING * self.lines.side());
+            let near = Reach { from: t - room, to: t + room, ..Reach::whole() };
+            surface.hit(&ray, near).or_else(|| surface.hit(&ray, Reach::whole()))
+        };
+        let Some(hit) = hit.or_else(again) else { return Through::MISS };
         let path = follow(surface, &ray, hit, self.optics, self.limit);
-        let depth = self.lines.depth(hit.place(&ray), line.pair);
-        let seen = Seen::of(&hit, depth, self.lights.hidden(&ray, &hit));
         let (exit_point, exit_dir) =
             path.exit.map_or(([0.0; 3], [0.0; 3]), |exit| (f32s(exit.origin), f32s(exit.dir)));
-        Through { seen, way: path.turns.min(0xff) | path.last_class << 8, exit_point, exit_dir }
+        let way = path.turns.min(0xff) | path.last_class << 8;
+        self.memo.put(line, (Through { seen, way, exit_point, exit_dir }, Some(hit))).0
     }
 
+    /// Whether rays are turned once, at the first hit, as far as is known.
     fn is_plain_mirror(&self, output: &Through) -> bool {
-        self.optics == Optics::Mirror && output.turns() == 1
+        self.optics == Optics::Mirror && (output.turns() == 1 || !output.is_finished())
     }
 
     /// The exit ray of an interpolated output for the ray that asked, which meets the object at `place`.

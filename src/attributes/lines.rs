@@ -1,6 +1,6 @@
 //! What attributes of surfaces share: lines of one object's box, and the distance of two output rays.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::chord::LEAST_SEPARATION;
 use crate::geometry::{Bounds, Ray, Real, Vec3, convex_hull};
@@ -18,20 +18,50 @@ pub struct SurfaceLines<'a> {
     surface: &'a Surface,
     space: LineSpace,
     middle: DVec3,
-    hull: Vec<DVec3>,
+    /// For lines along each axis, what slopes are scaled by, see [`SLOPE_SCALE`].
+    slope_scales: [f64; 3],
+    /// The rims of the hull for lines along each axis, seen along each of [`ACROSS`].
+    rims: [[Rim; 8]; 3],
 }
 
+/// How much of what is known of a line changes with its direction, where it meets the same place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ByDirection {
+    /// Little: normals are those of places.
+    Little,
+    /// Much: rays that are refracted leave by it.
+    Much,
+}
+
+/// What of a hull is farthest across, at any depth: (depth, across) from the middle, box units. Lines that run beyond all of
+/// these run beyond the hull.
+type Rim = Vec<DVec2>;
+
 impl<'a> SurfaceLines<'a> {
-    /// `None` if the surface has no extent.
-    pub fn new(surface: &'a Surface) -> Option<Self> {
+    /// For outputs that change with the place that a line meets, and with its direction as `by_direction` says. `None` if the
+    /// surface has no extent.
+    pub fn new(surface: &'a Surface, by_direction: ByDirection) -> Option<Self> {
         let bounds = surface.bounds();
         // The cube of the longest side, with room for the rounding of depths, which are told in its unit: planes as near to
         // each other as a sheet is thick would tell directions no finer than 30° at the greatest depth.
         let half = DVec3::splat((0.5 + 1e-6) * bounds.size().max_element());
         let space = LineSpace::new(Bounds { min: bounds.centre() - half, max: bounds.centre() + half })?;
+        let middle = bounds.centre();
         let points = surface.hull_points();
         let hull = convex_hull(&points).map_or(points, |mesh| mesh.vertices);
-        Some(Self { surface, space, middle: bounds.centre(), hull })
+        let side = bounds.size().max_element();
+        let slope_scales = match by_direction {
+            ByDirection::Little => (bounds.size() / side).max(DVec3::splat(LEAST_FLATNESS)) * SLOPE_SCALE,
+            ByDirection::Much => DVec3::splat(2.0 * SLOPE_SCALE),
+        };
+        let rims = [0, 1, 2].map(|k| {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            let of = |p: &DVec3| (*p - middle) / space.size()[k];
+            ACROSS.map(|[a, b]| {
+                rim(hull.iter().map(of).map(|p| DVec2::new(p[k], a * p[i] + b * p[j])).collect())
+            })
+        });
+        Some(Self { surface, space, middle, slope_scales: slope_scales.to_array(), rims })
     }
 
     /// The surface.
@@ -42,6 +72,11 @@ impl<'a> SurfaceLines<'a> {
     /// The line space of a cube around it.
     pub fn space(&self) -> &LineSpace {
         &self.space
+    }
+
+    /// The cube's side, in the scene's unit: what box units are of.
+    pub fn side(&self) -> f64 {
+        self.space.size().max_element()
     }
 
     /// A ray's line as its tree knows it.
@@ -58,8 +93,8 @@ impl<'a> SurfaceLines<'a> {
         let stuv = [
             half + off[0] * R::of(OFFSET_SCALE),
             half + off[1] * R::of(OFFSET_SCALE),
-            half + slope[0] * R::of(SLOPE_SCALE),
-            half + slope[1] * R::of(SLOPE_SCALE),
+            half + slope[0] * R::of(self.slope_scales[k]),
+            half + slope[1] * R::of(self.slope_scales[k]),
         ];
         LinePoint { pair, stuv: stuv.map(R::get) }
     }
@@ -71,7 +106,8 @@ impl<'a> SurfaceLines<'a> {
         let side = self.space.size()[k];
         let [x, y, p, q] = line.stuv.map(|c| R::of(c) - R::of(0.5));
         let (x, y) = (x * R::of(side / OFFSET_SCALE), y * R::of(side / OFFSET_SCALE));
-        let (p, q) = (p * R::of(1.0 / SLOPE_SCALE), q * R::of(1.0 / SLOPE_SCALE));
+        let over = R::of(1.0 / self.slope_scales[k]);
+        let (p, q) = (p * over, q * over);
         let back = R::of(-0.5 * along * side);
         let vector = |on_i: R, on_j: R, on_k: R| {
             let mut v = [on_k; 3];
@@ -112,23 +148,20 @@ impl<'a> SurfaceLines<'a> {
     /// Whether no line of the cell meets the surface, proved: all of the hull lies on one side of what the lines reach,
     /// seen along one of eight directions across the axis.
     pub fn is_certainly_empty<R: Real>(&self, pair: PlanePair, cell: &Cell) -> bool {
-        let [k, i, j] = pair.axes();
-        let side = self.space.size()[k];
-        let unit = |axis: usize, x: f64| (x - 0.5) / if axis < 2 { OFFSET_SCALE } else { SLOPE_SCALE };
+        let [k, ..] = pair.axes();
+        let unit =
+            |axis: usize, x: f64| (x - 0.5) / if axis < 2 { OFFSET_SCALE } else { self.slope_scales[k] };
         let low: [f64; 4] = std::array::from_fn(|a| unit(a, cell.low[a]));
         let high: [f64; 4] = std::array::from_fn(|a| unit(a, cell.high[a]));
-        ACROSS.into_iter().any(|[a, b]| {
+        ACROSS.into_iter().zip(&self.rims[k]).any(|([a, b], rim)| {
             let least = |w: f64, axis: usize| w * if w > 0.0 { low[axis] } else { high[axis] };
             let most = |w: f64, axis: usize| w * if w > 0.0 { high[axis] } else { low[axis] };
             let off = least(a, 0) + least(b, 1) - LEAST_SEPARATION;
             let (flattest, steepest) = (least(a, 2) + least(b, 3), most(a, 2) + most(b, 3));
-            self.hull.iter().all(|&p| {
-                let p = (Vec3::of(p) - Vec3::of(self.middle)) * R::of(1.0 / side);
-                let across = R::of(a) * p.axis(i) + R::of(b) * p.axis(j);
-                let depth = p.axis(k);
+            rim.iter().all(|p| {
                 // The least that a line has at that depth: by the least slope before the middle and the greatest behind.
-                let slope = if depth.get() > 0.0 { flattest } else { steepest };
-                across < R::of(off) + depth * R::of(slope)
+                let slope = if p.x > 0.0 { flattest } else { steepest };
+                R::of(p.y) < R::of(off) + R::of(p.x) * R::of(slope)
             })
         })
     }
@@ -138,7 +171,34 @@ impl<'a> SurfaceLines<'a> {
 const OFFSET_SCALE: f64 = 1.5;
 
 /// Slopes are at most 1, and take half the range: what a camera's rays meet changes less with the slope than with the place.
+/// Of a body that is flat along the lines' axis they take as much less as it is thin: it is met near the middle, where lines of
+/// any slope are in their places. Where outputs change much with the direction they take all of it.
 const SLOPE_SCALE: f64 = 0.75;
+
+/// No body counts as thinner than this share of its longest side: normals and exit rays may depend on the slope alone.
+const LEAST_FLATNESS: f64 = 1.0 / 4.0;
+
+/// The upper hull of (depth, across): the bound that lines are held against is the lesser of two linear ones, so that what
+/// holds at the hull's corners holds below it. Monotone chain, Andrew 1979, doi:10.1016/0020-0190(79)90072-3.
+fn rim(mut points: Vec<DVec2>) -> Rim {
+    points.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    let mut rim: Rim = Vec::new();
+    for point in points {
+        // What lies below the line by rounding alone is kept: a point too many does no harm.
+        let is_below = |rim: &Rim| {
+            let &[.., a, b] = &rim[..] else { return false };
+            (b - a).perp_dot(point - a) > RIM_ROUNDING
+        };
+        while is_below(&rim) {
+            rim.pop();
+        }
+        rim.push(point);
+    }
+    rim
+}
+
+/// Areas of triangles in box units that are certainly not rounding.
+const RIM_ROUNDING: f64 = 1e-12;
 
 #[cfg(test)]
 mod tests {
@@ -150,7 +210,7 @@ mod tests {
     #[test]
     fn lines_come_back_from_their_points_and_cells_called_empty_hold_none_that_hits() {
         let surface = Surface::Sphere(Sphere::new(DVec3::new(30.0, -4.0, 7.0), 12.0).expect("a sphere"));
-        let lines = SurfaceLines::new(&surface).expect("an extent");
+        let lines = SurfaceLines::new(&surface, ByDirection::Little).expect("an extent");
         let mut rng = rand_pcg::Pcg64::seed_from_u64(5);
         let (mut empty, mut hits) = (0, 0);
         for i in 0..3_000 {

@@ -4,7 +4,8 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 use crate::linespace::LinePoint;
 
-/// The samples remembered, at most: half a megabyte of exit rays, made when the first line is sampled.
+/// The samples remembered, at most: less than a megabyte of exit rays, made when the first line is sampled. They stand beside
+/// the cache of nodes, and do not grow.
 const PLACES: usize = 1 << 12;
 
 type Place<T> = Mutex<Option<(LinePoint, T)>>;
@@ -23,19 +24,29 @@ impl<T> Default for Memo<T> {
 }
 
 impl<T: Clone> Memo<T> {
+    /// Bytes that it holds once it is used, beside any cache: they do not grow.
+    pub const BYTES: usize = PLACES * size_of::<Place<T>>();
+
     /// The line's sample, remembered or made by `sample`.
     pub fn recall(&self, line: LinePoint, sample: impl FnOnce() -> T) -> T {
-        let places = self.places.get_or_init(|| (0..PLACES).map(|_| Mutex::new(None)).collect());
-        let place = &places[place_of(&line)];
-        let lock = || place.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((known, output)) = &*lock()
-            && *known == line
-        {
-            return output.clone();
-        }
-        let output = sample();
-        *lock() = Some((line, output.clone()));
+        self.get(&line).unwrap_or_else(|| self.put(line, sample()))
+    }
+
+    /// The line's sample, if it is remembered.
+    pub fn get(&self, line: &LinePoint) -> Option<T> {
+        let place = self.place(line).lock().unwrap_or_else(PoisonError::into_inner);
+        place.as_ref().filter(|(known, _)| known == line).map(|(_, output)| output.clone())
+    }
+
+    /// Remembers a line's sample, and returns it.
+    pub fn put(&self, line: LinePoint, output: T) -> T {
+        *self.place(&line).lock().unwrap_or_else(PoisonError::into_inner) = Some((line, output.clone()));
         output
+    }
+
+    fn place(&self, line: &LinePoint) -> &Place<T> {
+        let places = self.places.get_or_init(|| (0..PLACES).map(|_| Mutex::new(None)).collect());
+        &places[place_of(line)]
     }
 }
 

@@ -3,7 +3,7 @@
 
 use std::marker::PhantomData;
 
-use super::lines::SurfaceLines;
+use super::lines::{ByDirection, SurfaceLines};
 use super::surface::{blend, f32s, vector};
 use crate::geometry::{Ray, Real, Vec3};
 use crate::linespace::{Cell, LinePoint, PlanePair};
@@ -41,7 +41,7 @@ impl<'a, R: Real> SmoothChords<'a, R> {
     /// The chords of a closed convex surface. `None` if it has no extent.
     pub fn new(surface: &'a Surface) -> Option<Self> {
         let unit = 0.5 * surface.bounds().size().max_element();
-        Some(Self { lines: SurfaceLines::new(surface)?, unit, number: PhantomData })
+        Some(Self { lines: SurfaceLines::new(surface, ByDirection::Little)?, unit, number: PhantomData })
     }
 
     /// The body's lines.

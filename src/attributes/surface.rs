@@ -1,10 +1,10 @@
-//! The first hit of a line on a surface: place, normal, and which lights the object itself hides.
+//! The first hit of a line on a surface: place and normal.
 
 use std::marker::PhantomData;
 
 use super::lines::SurfaceLines;
 use super::memo::Memo;
-use crate::geometry::{Ray, Real, Vec3};
+use crate::geometry::{Real, Vec3};
 use crate::linespace::{Cell, LinePoint, PlanePair};
 use crate::ritree::Attribute;
 use crate::surface::{Hit, Reach};
@@ -25,21 +25,23 @@ impl Seen {
     /// Nothing is hit.
     pub const MISS: Self = Self { class: 0, depth: 0.0, normal: [0.0; 3] };
 
-    /// The class of the patch that is hit, the side it is hit from, and the lights hidden by the object itself, a bit for
-    /// each of the first eight.
-    pub(super) fn of<R: Real>(hit: &Hit<R>, depth: R, hidden: u8) -> Self {
-        let class = 1 + (u32::from(hidden) << 2 | u32::from(hit.enters) << 1) + (hit.class << 10);
+    /// The class of the patch that is hit, and the side it is hit from.
+    pub(super) fn of<R: Real>(hit: &Hit<R>, depth: R) -> Self {
+        let class = 1 + u32::from(hit.enters) + (hit.class << 1);
         Self { class, depth: depth.get() as f32, normal: f32s(hit.normal) }
     }
 
-    /// The lights hidden by the object itself.
-    pub fn hidden(&self) -> u8 {
-        (self.class.wrapping_sub(1) >> 2) as u8
+    /// The first hit of a line, and as it was found.
+    pub(super) fn along<R: Real>(lines: &SurfaceLines, line: LinePoint) -> (Self, Option<Hit<R>>) {
+        let ray = lines.ray::<R>(line);
+        let hit = lines.surface().hit(&ray, Reach::whole());
+        let seen = |hit: Hit<R>| Self::of(&hit, lines.depth(hit.place(&ray), line.pair));
+        (hit.map_or(Self::MISS, seen), hit)
     }
 
     /// Whether the hit comes from the side that the normal points to.
     pub fn enters(&self) -> bool {
-        self.class.wrapping_sub(1) >> 1 & 1 == 1
+        self.class.wrapping_sub(1) & 1 == 1
     }
 }
 
@@ -58,6 +60,12 @@ pub(super) fn blend<'a, R: Real>(parts: impl Iterator<Item = (R, &'a [f32; 3])>)
     parts.fold(Vec3::default(), |sum, (weight, v)| sum + vector(*v) * weight)
 }
 
+/// See [`Attribute::levels_spared`]: cells along outlines that are twice to four times as large, in the paper's pictures.
+pub(super) const LEVELS_SPARED: u32 = 2;
+
+/// See [`Attribute::second_look`]: off the middle along every side, differently far.
+pub(super) const SECOND_LOOK: [f64; 4] = [0.2, 0.6, 0.45, 0.35];
+
 /// How far two hits of one line are apart, box units, where a turn of the normal counts `leverage` times.
 pub(super) fn distance<R: Real>(a: &Seen, b: &Seen, leverage: f64) -> f64 {
     let turned = (vector::<R>(a.normal) - vector(b.normal)) * R::of(leverage);
@@ -65,33 +73,17 @@ pub(super) fn distance<R: Real>(a: &Seen, b: &Seen, leverage: f64) -> f64 {
     (moved * moved + turned.dot(turned)).sqrt().get()
 }
 
-/// Which lights of up to eight an object hides from a hit on itself, a bit each. A place that is lit from behind is not
-/// hidden: it is dark by its normal.
-pub trait Lights: Sync {
-    /// The bits for a hit along a ray.
-    fn hidden<R: Real>(&self, ray: &Ray<R>, hit: &Hit<R>) -> u8;
-}
-
 /// The attribute of surfaces that neither mirror nor refract.
-pub struct FirstHit<'a, L, R> {
+pub struct FirstHit<'a, R> {
     lines: SurfaceLines<'a>,
-    lights: L,
     memo: Memo<Seen>,
     number: PhantomData<R>,
 }
 
-impl<'a, L: Lights, R: Real> FirstHit<'a, L, R> {
-    /// The first hits on a surface under lights.
-    pub fn new(lines: SurfaceLines<'a>, lights: L) -> Self {
-        Self { lines, lights, memo: Memo::default(), number: PhantomData }
-    }
-
-    fn trace(&self, line: LinePoint) -> Seen {
-        let ray = self.lines.ray::<R>(line);
-        self.lines.surface().hit(&ray, Reach::whole()).map_or(Seen::MISS, |hit| {
-            let depth = self.lines.depth(hit.place(&ray), line.pair);
-            Seen::of(&hit, depth, self.lights.hidden(&ray, &hit))
-        })
+impl<'a, R: Real> FirstHit<'a, R> {
+    /// The first hits on a surface.
+    pub fn new(lines: SurfaceLines<'a>) -> Self {
+        Self { lines, memo: Memo::default(), number: PhantomData }
     }
 
     /// The surface's lines.
@@ -100,12 +92,16 @@ impl<'a, L: Lights, R: Real> FirstHit<'a, L, R> {
     }
 }
 
-impl<L: Lights, R: Real> Attribute for FirstHit<'_, L, R> {
+impl<R: Real> Attribute for FirstHit<'_, R> {
     type Output = Seen;
     type Real = R;
 
     fn sample(&self, line: LinePoint) -> Seen {
-        self.memo.recall(line, || self.trace(line))
+        self.memo.recall(line, || Seen::along::<R>(&self.lines, line).0)
+    }
+
+    fn levels_spared(&self) -> u32 {
+        LEVELS_SPARED
     }
 
     fn class(&self, output: &Seen) -> u32 {
@@ -131,6 +127,10 @@ impl<L: Lights, R: Real> Attribute for FirstHit<'_, L, R> {
 
     fn direction(&self, output: &Seen) -> Option<Vec3<R>> {
         (output.class != Seen::MISS.class).then(|| vector(output.normal))
+    }
+
+    fn second_look(&self) -> Option<[f64; 4]> {
+        Some(SECOND_LOOK)
     }
 
     fn is_certainly_empty(&self, pair: PlanePair, cell: &Cell) -> bool {

@@ -16,7 +16,7 @@ pub use audit::{AuditArgs, RayArgs};
 pub use bench::{BenchCommand, ChoiceArgs, CurveArgs, PaperArgs, RunArgs, ScaleArgs};
 pub use dose::{DoseArgs, FormatArg, TableArg};
 use parse::{parse_extent, parse_mm, parse_pair, parse_pixels, parse_point, parse_window};
-pub use trace::TraceArgs;
+pub use trace::{Application, TraceArgs};
 
 /// Exact intersection lengths of rays with organs: projection images of phantoms, with their numbers.
 ///

@@ -5,22 +5,24 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::args::{InterpolationArg, MethodArg, TraceArgs};
+use super::args::{Application, InterpolationArg, MethodArg, TraceArgs};
 use super::{Session, method, print};
 use crate::error::{Error, Result};
 use crate::geometry::{Counted, Real};
 use crate::modes::Control;
+use crate::modes::absorption::{Bodies, Lengths};
 use crate::modes::raytrace::{Picture, Renderer, Samples, Tracing, Trees, Work};
 use crate::output::projection::safe_name;
 use crate::output::{create_folder, json, picture, remove_stale};
 use crate::ritree::BuildCounts;
 use crate::scene::panel::MAX_PIXELS;
-use crate::scene::trace::{self, Recipe, World};
+use crate::scene::trace::{self, Camera, Recipe, World};
 
 /// A run's record: what was rendered, how, and what it took.
 #[derive(Debug, Serialize)]
 struct Record {
     scene: String,
+    application: Application,
     objects: usize,
     size: [u32; 2],
     samples: u32,
@@ -38,6 +40,10 @@ struct Record {
 #[derive(Debug, Default, Serialize)]
 struct Run {
     seconds: f64,
+    /// Of one thread, for each ray: from the camera, turned, or to a light.
+    nanoseconds_per_ray: f64,
+    /// What each view took; trees live from the first to the last.
+    of_views: Vec<Took>,
     #[serde(flatten)]
     work: Work,
     /// The share of pixels with a ray traced through an object that has a tree.
@@ -47,19 +53,136 @@ struct Run {
     build: BuildCounts,
 }
 
+impl Run {
+    /// Adds what it took to make the world ready to the first view, and sums up.
+    fn count_in(&mut self, seconds: f64) {
+        if let Some(first) = self.of_views.first_mut() {
+            first.seconds += seconds;
+        }
+        self.seconds = Took::sum(&self.of_views).seconds;
+        let of_threads = 1e9 * self.seconds * rayon::current_num_threads() as f64;
+        self.nanoseconds_per_ray = of_threads / self.work.rays.max(1) as f64;
+    }
+}
+
 /// The same views traced exactly.
 #[derive(Debug, Serialize)]
 struct Comparison {
     seconds: f64,
+    nanoseconds_per_ray: f64,
     #[serde(flatten)]
     work: Work,
     /// The mean distance of colours, sRGB from 0 to 1 per channel.
     mean_rgb_error: f64,
-    /// Seconds exact over seconds by trees.
+    /// Absorption: the mean difference of lengths, in half the longest side of the body.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mean_length_error: Option<f64>,
+    /// Of all views, building included.
+    #[serde(flatten)]
+    all: SpeedUp,
+    /// Of the first view, by trees that have seen nothing.
+    first_view: SpeedUp,
+    /// Of the others, by trees that have seen those before.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    further_views: Option<SpeedUp>,
+    /// Of all views once more, by trees that have seen them all.
+    warm: SpeedUp,
+}
+
+/// What some views took.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+struct Took {
+    seconds: f64,
+    #[serde(skip_serializing_if = "is_zero")]
+    operations: u64,
+}
+
+fn is_zero(count: &u64) -> bool {
+    *count == 0
+}
+
+impl Took {
+    fn sum(views: &[Self]) -> Self {
+        views.iter().fold(Self::default(), |sum, view| Self {
+            seconds: sum.seconds + view.seconds,
+            operations: sum.operations + view.operations,
+        })
+    }
+}
+
+/// What exact tracing took over what trees did.
+#[derive(Clone, Copy, Debug, Serialize)]
+struct SpeedUp {
+    /// In seconds.
     speed_up: f64,
-    /// Operations exact over operations by trees, if they were counted.
+    /// In floating-point operations, if they were counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     operations_speed_up: Option<f64>,
+}
+
+impl SpeedUp {
+    fn of(exact: &[Took], own: &[Took]) -> Self {
+        let (exact, own) = (Took::sum(exact), Took::sum(own));
+        let is_counted = exact.operations > 0;
+        Self {
+            speed_up: exact.seconds / own.seconds,
+            operations_speed_up: is_counted.then(|| exact.operations as f64 / own.operations.max(1) as f64),
+        }
+    }
+}
+
+/// A world made ready for what is made of its rays, and how long that took.
+struct Stage<'a, R: Real> {
+    matter: Matter<'a, R>,
+    seconds: f64,
+}
+
+enum Matter<'a, R: Real> {
+    Pictures(Renderer<'a, R>),
+    Absorption(Bodies<'a, R>),
+}
+
+/// What was made of one view.
+struct Made {
+    picture: Picture,
+    lengths: Option<Lengths>,
+}
+
+impl<'a, R: Real> Stage<'a, R> {
+    fn new(world: &'a World, tracing: Tracing, application: Application) -> Result<Self> {
+        let start = Instant::now();
+        let matter = match application {
+            Application::Pictures => Matter::Pictures(Renderer::new(world, tracing)),
+            Application::Absorption => Matter::Absorption(Bodies::new(world, tracing)?),
+        };
+        Ok(Self { matter, seconds: start.elapsed().as_secs_f64() })
+    }
+
+    fn view(&self, camera: &Camera, size: (u32, u32), samples: &Samples, control: &Control) -> Result<Made> {
+        Ok(match &self.matter {
+            Matter::Pictures(renderer) => {
+                Made { picture: renderer.render(camera, size, samples, control)?, lengths: None }
+            }
+            Matter::Absorption(bodies) => {
+                let lengths = bodies.lengths(camera, size, control)?;
+                Made { picture: lengths.picture(size), lengths: Some(lengths) }
+            }
+        })
+    }
+
+    fn tree_bytes(&self) -> usize {
+        match &self.matter {
+            Matter::Pictures(renderer) => renderer.tree_bytes(),
+            Matter::Absorption(bodies) => bodies.tree_bytes(),
+        }
+    }
+
+    fn build_counts(&self) -> BuildCounts {
+        match &self.matter {
+            Matter::Pictures(renderer) => renderer.build_counts(),
+            Matter::Absorption(bodies) => bodies.build_counts(),
+        }
+    }
 }
 
 /// Renders a scene and writes its pictures; the record is written last.
@@ -81,40 +204,53 @@ fn run_in<R: Real>(args: &TraceArgs, session: &Session, out: &mut dyn Write) -> 
     if !(1..=MAX_PIXELS).contains(&pixels) {
         return Err(Error::input("--size", "so many pixels do not serve", "give 1x1 to 8192x8192"));
     }
+    if args.application == Application::Absorption && args.samples != 1 {
+        return Err(Error::input(
+            "--samples",
+            "lengths are those of a pixel's middle",
+            "give 1, or a larger --size",
+        ));
+    }
+    let stage = Stage::<R>::new(&world, tracing, args.application)?;
     session.begin_writing();
     create_folder(&args.output)?;
-    let name = safe_name(&world.name);
+    let name = match args.application {
+        Application::Pictures => safe_name(&world.name),
+        Application::Absorption => format!("{}-absorption", safe_name(&world.name)),
+    };
     let record_path = args.output.join(format!("{name}.json"));
     remove_stale(&record_path)?;
 
-    let (pictures, run) = render::<R>(&world, tracing, args, &samples, session)?;
-    for (index, of_view) in pictures.iter().enumerate() {
-        let label = if pictures.len() == 1 { name.clone() } else { format!("{name}-{index}") };
-        picture::write(&args.output.join(format!("{label}.png")), of_view)?;
+    let (made, mut run) = render(&stage, &world, args, &samples, session)?;
+    run.count_in(stage.seconds);
+    for (index, of_view) in made.iter().enumerate() {
+        let label = if made.len() == 1 { name.clone() } else { format!("{name}-{index}") };
+        picture::write(&args.output.join(format!("{label}.png")), &of_view.picture)?;
         if args.map {
-            picture::write_map(&args.output.join(format!("{label}-map.png")), of_view)?;
+            picture::write_map(&args.output.join(format!("{label}-map.png")), &of_view.picture)?;
         }
     }
     let exact =
-        args.compare.then(|| compare::<R>(&world, args, &samples, session, &pictures, &run)).transpose()?;
+        args.compare.then(|| compare(&stage, &world, args, &samples, session, &made, &run)).transpose()?;
     let (method, settings) = match tracing {
         Tracing::RiTree(settings) => (MethodArg::Ritree, Some(settings)),
         Tracing::Exact => (MethodArg::Exact, None),
     };
     let record = Record {
         scene: world.name.clone(),
+        application: args.application,
         objects: world.objects.len(),
         size: args.size,
         samples: args.samples,
         method: method.name(),
         settings,
-        views: pictures.len(),
+        views: made.len(),
         threads: rayon::current_num_threads(),
         run,
         exact,
     };
     json::write(&record_path, &record)?;
-    session.remark(&format!("{} pictures in {}", pictures.len(), args.output.display()));
+    session.remark(&format!("{} pictures in {}", made.len(), args.output.display()));
     if args.json {
         print(out, &json::text(&record)?)?;
     }
@@ -144,54 +280,66 @@ fn tracing(args: &TraceArgs) -> Result<Tracing> {
     }
 }
 
-/// All views, and what they took together; trees live from the first to the last.
+/// All views, and what they took; trees live from the first to the last.
 fn render<R: Real>(
+    stage: &Stage<R>,
     world: &World,
-    tracing: Tracing,
     args: &TraceArgs,
     samples: &Samples,
     session: &Session,
-) -> Result<(Vec<Picture>, Run)> {
+) -> Result<(Vec<Made>, Run)> {
     let size = (args.size[0], args.size[1]);
     let pixels = u64::from(size.0) * u64::from(size.1) * world.cameras.len() as u64;
     let bar = session.progress(pixels, "pixels");
     let advance = |done| bar.inc(done);
     let control = Control::new(session.cancel(), &advance);
-    let start = Instant::now();
-    let renderer = Renderer::<R>::new(world, tracing);
-    let pictures: Vec<Picture> = world
-        .cameras
-        .iter()
-        .map(|camera| renderer.render(camera, size, samples, &control))
-        .collect::<Result<_>>()?;
-    let mut run = Run {
-        seconds: start.elapsed().as_secs_f64(),
-        tree_bytes: renderer.tree_bytes(),
-        build: renderer.build_counts(),
-        ..Run::default()
-    };
-    pictures.iter().for_each(|picture| run.work += picture.work());
-    let traced = pictures.iter().flat_map(Picture::traced).filter(|traced| **traced).count();
+    let (mut made, mut run) = (Vec::with_capacity(world.cameras.len()), Run::default());
+    for camera in &world.cameras {
+        let start = Instant::now();
+        let of_view = stage.view(camera, size, samples, &control)?;
+        let work = of_view.picture.work();
+        run.of_views.push(Took { seconds: start.elapsed().as_secs_f64(), operations: work.operations });
+        run.work += work;
+        made.push(of_view);
+    }
+    run.count_in(0.0);
+    run.tree_bytes = stage.tree_bytes();
+    run.build = stage.build_counts();
+    let traced = made.iter().flat_map(|m| m.picture.traced()).filter(|traced| **traced).count();
     run.traced_pixels = traced as f64 / pixels as f64;
-    Ok((pictures, run))
+    Ok((made, run))
 }
 
+/// The views of a stage that has made them once, traced exactly and made once more.
 fn compare<R: Real>(
+    stage: &Stage<R>,
     world: &World,
     args: &TraceArgs,
     samples: &Samples,
     session: &Session,
-    pictures: &[Picture],
+    made: &[Made],
     run: &Run,
 ) -> Result<Comparison> {
-    let (exact, took) = render::<R>(world, Tracing::Exact, args, samples, session)?;
-    let errors: Vec<f64> = pictures.iter().zip(&exact).filter_map(|(a, b)| a.mean_distance(b)).collect();
-    let counted = took.work.operations > 0;
+    let by_rays = Stage::<R>::new(world, Tracing::Exact, args.application)?;
+    let (exact, mut took) = render(&by_rays, world, args, samples, session)?;
+    took.count_in(by_rays.seconds);
+    let (_, again) = render(stage, world, args, samples, session)?;
+    let mean = |errors: Vec<f64>| errors.iter().sum::<f64>() / errors.len() as f64;
+    let pairs = || made.iter().zip(&exact);
+    let lengths: Vec<f64> = pairs()
+        .filter_map(|(own, exact)| Some(own.lengths.as_ref()?.mean_difference(exact.lengths.as_ref()?)))
+        .collect();
+    let further_views =
+        (run.of_views.len() > 1).then(|| SpeedUp::of(&took.of_views[1..], &run.of_views[1..]));
     Ok(Comparison {
         seconds: took.seconds,
+        nanoseconds_per_ray: took.nanoseconds_per_ray,
         work: took.work,
-        mean_rgb_error: errors.iter().sum::<f64>() / errors.len() as f64,
-        speed_up: took.seconds / run.seconds,
-        operations_speed_up: counted.then(|| took.work.operations as f64 / run.work.operations.max(1) as f64),
+        mean_rgb_error: mean(pairs().filter_map(|(a, b)| a.picture.mean_distance(&b.picture)).collect()),
+        mean_length_error: (!lengths.is_empty()).then(|| mean(lengths)),
+        all: SpeedUp::of(&took.of_views, &run.of_views),
+        first_view: SpeedUp::of(&took.of_views[..1], &run.of_views[..1]),
+        further_views,
+        warm: SpeedUp::of(&took.of_views, &again.of_views),
     })
 }

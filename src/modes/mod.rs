@@ -1,5 +1,6 @@
 //! What can be done with a scene. Modes return values; they print nothing and write no files.
 
+pub mod absorption;
 pub mod audit;
 pub mod bench;
 mod control;

@@ -17,6 +17,37 @@ pub trait Attribute: Sync {
     /// The exact output of a line.
     fn sample(&self, line: LinePoint) -> Self::Output;
 
+    /// As much of the output as tells its [`outline_class`](Self::outline_class): corners are sampled so, since most lie where
+    /// a discontinuity is cut out, and [finished](Self::finish) where their cell lies on one side.
+    fn outline(&self, line: LinePoint) -> Self::Output {
+        self.sample(line)
+    }
+
+    /// What is known of the class from the outline: where it differs, classes do.
+    fn outline_class(&self, output: &Self::Output) -> u32 {
+        self.class(output)
+    }
+
+    /// How many levels before the greatest depth cells end that hold a discontinuity, or all of whose corners miss: their lines
+    /// are traced, and where few lines ask for a cell that is less than to sample it. 0 is the paper's rule.
+    fn levels_spared(&self) -> u32 {
+        0
+    }
+
+    /// The outline within an output, where outlines have [distances](Self::distance) and [directions](Self::direction) of their
+    /// own: corners are then finished for cells only that these leave whole.
+    fn outline_within(&self, _output: &Self::Output) -> Option<Self::Output> {
+        None
+    }
+
+    /// Whether a whole output's distances and directions are those of the [outline within](Self::outline_within).
+    fn is_told_by_outline(&self, _output: &Self::Output) -> bool {
+        false
+    }
+
+    /// Makes the outline of a line its sample, unless it is.
+    fn finish(&self, _line: LinePoint, _output: &mut Self::Output) {}
+
     /// The equivalence class of the patch that the sample met; outputs are interpolated within one class only. A miss
     /// is a class too. Attributes without discontinuities have one class.
     fn class(&self, output: &Self::Output) -> u32;
@@ -39,6 +70,17 @@ pub trait Attribute: Sync {
 
     /// The direction of an output, for the angular threshold. `None` for attributes without directions.
     fn direction(&self, _output: &Self::Output) -> Option<Vec3<Self::Real>> {
+        None
+    }
+
+    /// What of the angular threshold directions may differ by: less than all of it where what is told turns farther than they do.
+    fn angular_share(&self) -> f64 {
+        1.0
+    }
+
+    /// Where in a cell, from 0 to 1 along each side, a second line must pass the midpoint's test. Of what bends one way along one
+    /// side and the other way along another the midpoint knows nothing. `None` is the paper's rule.
+    fn second_look(&self) -> Option<[f64; 4]> {
         None
     }
 

@@ -103,9 +103,16 @@ impl Place {
         LinePoint { pair: self.pair, stuv }
     }
 
-    /// Samples all 16 corners.
+    /// The outlines of all 16 corners.
     pub fn sample<A: Attribute>(&self, attribute: &A) -> Corners<A::Output> {
-        std::array::from_fn(|bits| attribute.sample(self.line(self.cell.corner(bits))))
+        std::array::from_fn(|bits| attribute.outline(self.line(self.cell.corner(bits))))
+    }
+
+    /// The corners' whole samples.
+    pub fn finish<A: Attribute>(&self, attribute: &A, corners: &mut Corners<A::Output>) {
+        for (bits, corner) in corners.iter_mut().enumerate() {
+            attribute.finish(self.line(self.cell.corner(bits)), corner);
+        }
     }
 
     /// The corners of the two halves: 8 of each are the cell's own, 8 new ones are sampled and shared.
@@ -119,7 +126,7 @@ impl Place {
         let is_high = |bits: usize| bits >> axis & 1 == 1;
         // The lower half's high side lies on the cut.
         let cut: [Option<A::Output>; 16] = std::array::from_fn(|bits| {
-            is_high(bits).then(|| attribute.sample(self.line(lower.corner(bits))))
+            is_high(bits).then(|| attribute.outline(self.line(lower.corner(bits))))
         });
         let on_cut = |bits: usize| cut[bits | 1 << axis].clone();
         let pick = |own: bool, bits: usize| match on_cut(bits) {
@@ -137,27 +144,21 @@ impl Place {
         self.depth >= parameters.max_depth.min(DEEPEST)
     }
 
-    /// What is to be done with the cell (§2.3, and §2.5 for its kind). `middle_sampled` is told of the sample of a midpoint test.
+    /// What is to be done with the cell (§2.3, and §2.5 for its kind). Its corners are finished if that tells it;
+    /// `middle_sampled` is told of each sample of a midpoint test.
     pub fn verdict<A: Attribute>(
         &self,
         attribute: &A,
-        corners: &Corners<A::Output>,
+        corners: &mut Corners<A::Output>,
         parameters: &Parameters,
-        middle_sampled: impl FnOnce(),
+        middle_sampled: impl Fn(),
     ) -> Verdict {
-        let is_deepest = self.is_deepest(parameters);
-        let class = attribute.class(&corners[0]);
-        let other = corners.iter().map(|c| attribute.class(c)).find(|&c| c != class);
-        if let Some(other) = other {
-            // No interpolant crosses a discontinuity; smaller cells leave fewer lines on it.
-            let third = corners.iter().map(|c| attribute.class(c)).any(|c| c != class && c != other);
-            return match (is_deepest, third) {
-                (false, _) => Verdict::Split,
-                (true, false) => Verdict::Final(Kind::TwoClasses),
-                (true, true) => Verdict::Final(Kind::Traced(Reason::Classes)),
-            };
+        let is_deepest = self.depth.saturating_add(attribute.levels_spared()) >= parameters.max_depth
+            || self.is_deepest(parameters);
+        if let Some(mixed) = mixed(corners, |c| attribute.outline_class(c), is_deepest) {
+            return mixed;
         }
-        if attribute.is_miss(class) {
+        if attribute.is_miss(attribute.outline_class(&corners[0])) {
             return if attribute.is_certainly_empty(self.pair, &self.cell) {
                 Verdict::Final(Kind::Empty)
             } else if is_deepest {
@@ -166,35 +167,56 @@ impl Place {
                 Verdict::Split
             };
         }
+        if attribute.outline_within(&corners[0]).is_some() {
+            let outlines =
+                corners.each_ref().map(|c| attribute.outline_within(c).unwrap_or_else(|| c.clone()));
+            let by_outlines = self.smoothness(attribute, &outlines, parameters, |line| {
+                middle_sampled();
+                attribute.outline(line)
+            });
+            if by_outlines != Verdict::Final(Kind::Smooth) {
+                return by_outlines;
+            }
+        }
+        self.finish(attribute, corners);
+        if let Some(mixed) = mixed(corners, |c| attribute.class(c), is_deepest) {
+            return mixed;
+        }
+        if attribute.is_told_by_outline(&corners[0]) {
+            return Verdict::Final(Kind::Smooth);
+        }
+        self.smoothness(attribute, corners, parameters, |line| {
+            middle_sampled();
+            attribute.sample(line)
+        })
+    }
+
+    /// What is to be done with a cell of one class by how near to each other its corners are, and by the midpoint test:
+    /// interpolated against exact at the cell's centre.
+    fn smoothness<A: Attribute>(
+        &self,
+        attribute: &A,
+        corners: &Corners<A::Output>,
+        parameters: &Parameters,
+        exact: impl Fn(LinePoint) -> A::Output,
+    ) -> Verdict {
         // Smaller cells hold directions nearer to each other.
         let is_wide = spread_exceeds(attribute, corners.iter(), parameters.angular_threshold_deg);
-        if is_deepest {
+        if self.is_deepest(parameters) {
             return Verdict::Final(if is_wide { Kind::Traced(Reason::Angle) } else { Kind::Smooth });
         }
         if is_wide {
             return Verdict::Split;
         }
-        middle_sampled();
-        match self.middle_is_near(attribute, corners, class, parameters.distance_threshold) {
-            true => Verdict::Final(Kind::Smooth),
-            false => Verdict::Split,
-        }
-    }
-
-    /// The midpoint test: interpolated against exact at the cell's centre.
-    fn middle_is_near<A: Attribute>(
-        &self,
-        attribute: &A,
-        corners: &Corners<A::Output>,
-        class: u32,
-        threshold: f64,
-    ) -> bool {
-        let exact = attribute.sample(self.line(self.cell.centre()));
-        if attribute.class(&exact) != class {
-            return false;
-        }
-        let near = attribute.distance(&quadrilinear(attribute, corners, [A::Real::of(0.5); 4]), &exact);
-        near <= threshold
+        let class = attribute.class(&corners[0]);
+        let is_near = |at: [f64; 4]| {
+            let exact = exact(self.line(self.cell.at(at)));
+            let near = || quadrilinear(attribute, corners, at.map(A::Real::of));
+            attribute.class(&exact) == class
+                && attribute.distance(&near(), &exact) <= parameters.distance_threshold
+        };
+        let is_smooth = is_near([0.5; 4]) && attribute.second_look().is_none_or(is_near);
+        if is_smooth { Verdict::Final(Kind::Smooth) } else { Verdict::Split }
     }
 
     /// The interpolated output of a line of a cell of two classes, or why it is traced.
@@ -217,6 +239,18 @@ impl Place {
         let parts: Vec<_> = usable.iter().zip(weights).map(part).collect();
         Ok(attribute.interpolate(&parts))
     }
+}
+
+/// The verdict on a cell with corners of more than one class.
+fn mixed<T>(corners: &Corners<T>, class_of: impl Fn(&T) -> u32, is_deepest: bool) -> Option<Verdict> {
+    let class = class_of(&corners[0]);
+    let other = corners.iter().map(&class_of).find(|&c| c != class)?;
+    if !is_deepest {
+        // No interpolant crosses a discontinuity; smaller cells leave fewer lines on it.
+        return Some(Verdict::Split);
+    }
+    let third = corners.iter().map(class_of).any(|c| c != class && c != other);
+    Some(Verdict::Final(if third { Kind::Traced(Reason::Classes) } else { Kind::TwoClasses }))
 }
 
 /// Quadrilinear interpolation at fractions of the cell: bilinear in (u, v) within each directional group, the four
@@ -284,7 +318,7 @@ where
     A::Output: 'a,
 {
     let directions: Vec<_> = outputs.filter_map(|o| attribute.direction(o)).collect();
-    let least_cosine = A::Real::of(threshold_deg.to_radians().cos());
+    let least_cosine = A::Real::of((attribute.angular_share() * threshold_deg).to_radians().cos());
     directions.iter().enumerate().any(|(i, a)| directions[..i].iter().any(|b| a.dot(*b) < least_cosine))
 }
 

@@ -142,8 +142,8 @@ impl<'t, A: Attribute> Descent<'t, A> {
         }
     }
 
-    fn push(&mut self, place: Place, corners: Corners<A::Output>, beside: Option<Corners<A::Output>>) {
-        let verdict = self.tree.verdict(&place, &corners);
+    fn push(&mut self, place: Place, mut corners: Corners<A::Output>, beside: Option<Corners<A::Output>>) {
+        let verdict = self.tree.verdict(&place, &mut corners);
         self.trail.push(Step { place, corners, beside, verdict });
     }
 }

@@ -233,7 +233,8 @@ impl<A: Keepable> RiTree<A> {
                 }
                 let node = node.filter(|_| cache.reserve(size_of::<Leaf<A::Output>>()));
                 // A look at what was read is none of what growing the tree takes.
-                let verdict = || place.verdict(&self.attribute, &corners, &self.parameters, || ());
+                let mut looked_at = corners.clone();
+                let mut verdict = || place.verdict(&self.attribute, &mut looked_at, &self.parameters, || ());
                 if loaded.count(node.is_some())
                     && (place.sample(&self.attribute) != corners || verdict() != Verdict::Final(kind))
                 {

@@ -163,7 +163,7 @@ impl<A: Attribute> RiTree<A> {
         place.split(&self.attribute, corners)
     }
 
-    fn verdict(&self, place: &Place, corners: &cell::Corners<A::Output>) -> Verdict {
+    fn verdict(&self, place: &Place, corners: &mut cell::Corners<A::Output>) -> Verdict {
         let middle_sampled = || self.counters.sampled(1, 0);
         place.verdict(&self.attribute, corners, &self.parameters, middle_sampled)
     }

@@ -102,8 +102,8 @@ impl<T: Clone + Send + Sync> Node<T> {
         if !cache.reserve(largest) {
             return Err(guard.clone());
         }
-        let corners = guard.take().unwrap_or_else(|| Box::new(tree.sample_corners(place)));
-        let kept = match tree.verdict(place, &corners) {
+        let mut corners = guard.take().unwrap_or_else(|| Box::new(tree.sample_corners(place)));
+        let kept = match tree.verdict(place, &mut corners) {
             Verdict::Final(kind) => {
                 let now = tree.clock.load(Ordering::Relaxed);
                 let _ = self.leaf.set(Box::new(Leaf::new(kind, *corners, now)));
@@ -173,25 +173,35 @@ impl<T: Clone + Send + Sync> Node<T> {
         A: Attribute<Output = T>,
         T: PartialEq + std::fmt::Debug,
     {
-        let sampled = place.sample(&tree.attribute);
-        let verdict = || place.verdict(&tree.attribute, &sampled, &tree.parameters, || ());
+        let mut sampled = place.sample(&tree.attribute);
+        let verdict = place.verdict(&tree.attribute, &mut sampled, &tree.parameters, || ());
+        // Corners are finished as the cells need that they came through.
+        let finished = |corners: &Corners<T>| {
+            let mut corners = corners.clone();
+            place.finish(&tree.attribute, &mut corners);
+            corners
+        };
         if let Some(leaf) = self.leaf() {
             assert!(
                 self.halves().is_none() && self.lock().is_none(),
                 "a final leaf holds only its own corners"
             );
-            assert_eq!(leaf.corners, sampled, "stored corners are their lines' samples");
-            assert_eq!(Verdict::Final(leaf.kind), verdict(), "a final leaf is final");
+            assert_eq!(
+                finished(&leaf.corners),
+                finished(&sampled),
+                "stored corners are their lines' samples"
+            );
+            assert_eq!(Verdict::Final(leaf.kind), verdict, "a final leaf is final");
             return size_of::<Leaf<T>>();
         }
         if let Some(halves) = self.halves() {
             assert!(self.lock().is_none(), "a split node keeps no corners");
-            assert_eq!(verdict(), Verdict::Split, "only cells that must are split");
+            assert_eq!(verdict, Verdict::Split, "only cells that must are split");
             let inside = |side: usize| halves[side].check(&place.half(side), tree);
             return bytes::<T>(2) + inside(0) + inside(1);
         }
         self.lock().as_ref().map_or(0, |corners| {
-            assert_eq!(**corners, sampled, "waiting corners are their lines' samples");
+            assert_eq!(finished(corners), finished(&sampled), "waiting corners are their lines' samples");
             size_of::<Corners<T>>()
         })
     }

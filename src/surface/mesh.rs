@@ -51,6 +51,11 @@ impl SmoothMesh {
         &self.mesh.vertices
     }
 
+    /// The boxes around its faces.
+    pub fn parts(&self) -> impl Iterator<Item = Bounds> + '_ {
+        self.mesh.faces.iter().map(|face| Bounds::of(face.map(|i| self.mesh.vertices[i as usize])))
+    }
+
     /// The nearest hit within reach. `None` if there is none. Shared edges are counted in at least one face (Woop, Benthin
     /// & Wald 2013: signs of edges are the same numbers from both sides).
     pub fn hit<R: Real>(&self, ray: &Ray<R>, reach: Reach<R>) -> Option<Hit<R>> {

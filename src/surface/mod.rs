@@ -23,7 +23,7 @@ mod spline;
 #[cfg(test)]
 mod tests;
 
-pub use frame::Slabs;
+pub use frame::{Slabs, steady_gap};
 pub use mesh::SmoothMesh;
 pub use patch::BezierPatch;
 pub use revolution::{ARC, revolve};
@@ -140,6 +140,15 @@ impl Surface {
             Self::Shell(s) => s.is_met(ray, reach),
             Self::Mesh(s) => s.is_met(ray, reach),
             simple => simple.hit(ray, reach).is_some(),
+        }
+    }
+
+    /// Boxes that hold all of the surface, each a part of it.
+    pub fn parts(&self) -> Vec<Bounds> {
+        match self {
+            Self::Shell(s) => s.parts().collect(),
+            Self::Mesh(s) => s.parts().collect(),
+            simple => vec![simple.bounds()],
         }
     }
 

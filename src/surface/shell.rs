@@ -43,6 +43,11 @@ impl Shell {
         &self.patches
     }
 
+    /// The boxes around its pieces.
+    pub fn parts(&self) -> impl Iterator<Item = Bounds> + '_ {
+        self.pieces.iter().map(|piece| piece.bounds)
+    }
+
     /// All control points.
     pub fn control_points(&self) -> impl Iterator<Item = DVec3> + '_ {
         self.patches.iter().flat_map(|patch| patch.net().iter().flatten().copied())

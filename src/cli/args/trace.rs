@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::{MethodArgs, parse_pixels};
 
@@ -11,6 +11,10 @@ use super::{MethodArgs, parse_pixels};
 pub struct TraceArgs {
     /// A scene file, or the name of a scene that comes with the program: bezier-surface, random-volumes, tomatoes.
     pub scene: String,
+
+    /// What is made of the rays: pictures, or, of closed convex bodies that are looked through, greys by the lengths in them.
+    #[arg(long, value_enum, default_value = "pictures")]
+    pub application: Application,
 
     /// The folder to write to; made if missing.
     #[arg(long, short, default_value = "out", value_name = "DIR")]
@@ -40,7 +44,8 @@ pub struct TraceArgs {
     #[arg(long)]
     pub map: bool,
 
-    /// RI-tree: also trace every ray exactly, and tell the colours' mean distance and the speed-up.
+    /// RI-tree: also trace every ray exactly, and tell the colours' mean distance and the speed-ups: of all views, of the
+    /// first alone, of the others, and of all once more by trees that have seen them.
     #[arg(long)]
     pub compare: bool,
 
@@ -55,4 +60,14 @@ pub struct TraceArgs {
     /// How rays find objects: ritree or exact.
     #[command(flatten)]
     pub method: MethodArgs,
+}
+
+/// What `trace` makes of rays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Application {
+    /// Shaded pictures.
+    Pictures,
+    /// Lengths in bodies, each half opaque over half its longest side.
+    Absorption,
 }

@@ -6,12 +6,13 @@
 //!              └──── exit ray ◄─────────┘  mirrored · refracted · straight on, up to a limit
 //! ```
 //!
-//! Trees are asked for what is smooth, by rays from the camera on: the first hit of a line with its normal, the lights that
-//! the object hides from it, and the ray that leaves a mirror or a glass body. They are kept from view to view. Where they do
-//! not answer, where a ray starts within an object's box, for objects without a tree, after a turn, and to lights past other
-//! objects, rays are traced. Colours are floats to the end; a pixel depends on its rays alone, so pictures are the same bits
-//! for any number of threads.
+//! Trees are asked for what is smooth, by rays from the camera on: the first hit of a line with its normal, and the ray that
+//! leaves a mirror or a glass body. What lights see of an object with a tree is interpolated, too. All of it is kept from view
+//! to view. Where trees do not answer, where a ray starts within an object's box, for objects without a tree and after a turn,
+//! rays are traced. Colours are floats to the end; a pixel depends on its rays alone, so pictures are the same bits for any
+//! number of threads.
 
+mod light_map;
 mod picture;
 mod seer;
 #[cfg(test)]
@@ -31,7 +32,7 @@ use crate::scene::trace::{Camera, World};
 use crate::surface::optics::{reflectance, reflected};
 use crate::surface::{Reach, Slabs};
 pub use picture::{Picture, Samples};
-use seer::{Seer, Sight};
+use seer::{Asker, Seer, Sight};
 
 /// How trees of what rays meet are grown; the defaults are the paper's.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -137,9 +138,9 @@ impl<'a, R: Real> Renderer<'a, R> {
         Ok(Picture::of_tiles(size, tiles))
     }
 
-    /// Bytes that the trees hold.
+    /// Bytes that the trees hold, and tables beside them: the cache's limit is that of the trees, tables do not grow.
     pub fn tree_bytes(&self) -> usize {
-        self.cache.used_bytes()
+        self.cache.used_bytes() + self.enter().iter().map(Seer::table_bytes).sum::<usize>()
     }
 
     /// What building the trees took.
@@ -161,6 +162,7 @@ impl<'a, R: Real> Renderer<'a, R> {
         let mut light = LightPath {
             world: self.world,
             seers: &seers,
+            askers: seers.iter().map(Seer::asker).collect(),
             cache: &self.cache,
             work: Work::default(),
             was_traced: false,
@@ -205,6 +207,7 @@ struct Tile {
 struct LightPath<'t, 'a, R: Real> {
     world: &'t World,
     seers: &'t [Seer<'a, R>],
+    askers: Vec<Asker<'t, 'a, R>>,
     cache: &'t Cache,
     work: Work,
     /// Whether an object with a tree was traced.
@@ -269,9 +272,10 @@ impl<R: Real> LightPath<'_, '_, R> {
     /// The nearest object along a ray.
     fn nearest(&mut self, ray: &Ray<R>, left: Option<usize>) -> Option<(usize, Sight<R>)> {
         let mut best: Option<(usize, Sight<R>)> = None;
+        let slabs = Slabs::new(ray);
         for index in (0..self.seers.len()).filter(|&i| Some(i) != left) {
             let to = best.as_ref().map_or(R::of(f64::INFINITY), |(_, sight)| sight.t);
-            if let Some(sight) = self.sight(index, ray, to) {
+            if let Some(sight) = self.sight(index, ray, &slabs, to) {
                 best = Some((index, sight));
             }
         }
@@ -279,9 +283,9 @@ impl<R: Real> LightPath<'_, '_, R> {
     }
 
     /// One object along a ray, not beyond `to`.
-    fn sight(&mut self, index: usize, ray: &Ray<R>, to: R) -> Option<Sight<R>> {
+    fn sight(&mut self, index: usize, ray: &Ray<R>, slabs: &Slabs<R>, to: R) -> Option<Sight<R>> {
         let seer = &self.seers[index];
-        let (near, far) = Slabs::new(ray).stretch(&seer.bounds)?;
+        let (near, far) = slabs.stretch(&seer.bounds)?;
         if near > to || far.get() <= 0.0 {
             return None;
         }
@@ -289,7 +293,7 @@ impl<R: Real> LightPath<'_, '_, R> {
             // The tree knows the first hit of the whole line: it serves where that lies ahead.
             if self.is_from_camera && near.get() > 0.0 {
                 self.work.queries += 1;
-                if let Ok(answer) = seer.ask(ray, self.cache) {
+                if let Ok(answer) = self.askers[index].ask(ray, self.cache) {
                     self.work.interpolated += 1;
                     return answer.filter(|sight| sight.t <= to);
                 }
@@ -309,16 +313,15 @@ impl<R: Real> LightPath<'_, '_, R> {
         if material.is_dark() {
             return light;
         }
-        let hidden = self.seers[object].hidden(ray, sight);
-        for (bit, lamp) in world.lights.iter().enumerate() {
+        for (light_index, lamp) in world.lights.iter().enumerate() {
             let way = Vec3::of(lamp.position) - sight.place;
             let far = way.length();
             let dir = way * (R::of(1.0) / far);
             let cosine = dir.dot(sight.normal);
-            if cosine.get() <= 0.0 || hidden >> bit & 1 == 1 {
+            if cosine.get() <= 0.0 || self.seers[object].hides_itself(light_index, ray, sight, cosine) {
                 continue;
             }
-            let reaching = self.visibility(object, &Ray { origin: sight.place, dir }, far);
+            let reaching = self.visibility(object, light_index, &Ray { origin: sight.place, dir }, far);
             if reaching.get() <= 0.0 {
                 continue;
             }
@@ -334,21 +337,17 @@ impl<R: Real> LightPath<'_, '_, R> {
     }
 
     /// The share of a light that reaches a place of an object through all others.
-    fn visibility(&mut self, object: usize, ray: &Ray<R>, far: R) -> R {
+    fn visibility(&mut self, object: usize, light: usize, ray: &Ray<R>, far: R) -> R {
         self.work.rays += 1;
+        let slabs = Slabs::new(ray);
         let mut share = R::of(1.0);
         for index in (0..self.seers.len()).filter(|&i| i != object) {
-            if share.get() > 0.0 && self.is_met(index, ray, far) {
-                share = share * R::of(self.seers[index].material().translucence());
+            let seer = &self.seers[index];
+            let is_near = || slabs.entry(&seer.bounds, R::of(0.0), far).is_some();
+            if share.get() > 0.0 && is_near() && seer.hides(light, ray, far) {
+                share = share * R::of(seer.material().translucence());
             }
         }
         share
-    }
-
-    /// Whether an object is met before `far`: traced, which stops at any hit and so costs less than a tree's answer.
-    fn is_met(&mut self, index: usize, ray: &Ray<R>, far: R) -> bool {
-        let seer = &self.seers[index];
-        let within = Slabs::new(ray).entry(&seer.bounds, R::of(0.0), far);
-        within.is_some() && seer.is_met(ray, Reach { to: far, ..Reach::whole() })
     }
 }

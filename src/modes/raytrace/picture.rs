@@ -36,6 +36,11 @@ impl Picture {
         picture
     }
 
+    /// A picture of greys, row by row; black where there is none.
+    pub(in crate::modes) fn of_greys(size: (u32, u32), greys: &[f32], traced: Vec<bool>, work: Work) -> Self {
+        Self { size, colours: greys.iter().map(|&grey| [grey; 3]).collect(), traced, work }
+    }
+
     /// Columns and rows.
     pub fn size(&self) -> (u32, u32) {
         self.size

@@ -2,15 +2,17 @@
 
 use glam::DVec3;
 
-use crate::attributes::exit_ray::ExitRay;
-use crate::attributes::lines::SurfaceLines;
-use crate::attributes::surface::{FirstHit, Lights, Seen, vector};
+use super::light_map::LightMap;
+use crate::attributes::exit_ray::{self, ExitRay};
+use crate::attributes::lines::{ByDirection, SurfaceLines};
+use crate::attributes::memo::Memo;
+use crate::attributes::surface::{FirstHit, Seen, vector};
 use crate::geometry::{Bounds, Ray, Real, Vec3};
 use crate::linespace::{LinePoint, is_in_range};
-use crate::ritree::{Answer, BuildCounts, Cache, Parameters, Reason, RiTree};
+use crate::ritree::{Answer, BuildCounts, Cache, Descent, Parameters, Reason, RiTree};
 use crate::scene::trace::{Material, Object, World};
 use crate::surface::optics::{Optics, follow};
-use crate::surface::{Hit, Reach, Surface};
+use crate::surface::{Hit, Reach, steady_gap};
 
 /// A place where an object is seen.
 #[derive(Clone, Copy, Debug)]
@@ -28,46 +30,26 @@ pub struct Sight<R> {
 /// What is known of a sight beside its place and normal.
 #[derive(Clone, Copy, Debug)]
 pub enum Known<R> {
-    /// The hit; shadows and the way on are found when they are asked for.
+    /// The hit; the way on is found when it is asked for.
     Traced(Hit<R>),
-    /// The tree has told it all.
-    Told {
-        /// Lights that the object itself hides from there, a bit each.
-        hidden: u8,
-        /// How the ray goes on that the object turns, and after how many turns. `None` if it does not.
-        turned: Option<(Ray<R>, u32)>,
-    },
-}
-
-/// The lights of a world before one surface.
-#[derive(Clone, Debug)]
-pub struct OwnShadow<'a> {
-    surface: &'a Surface,
-    lights: Vec<DVec3>,
-}
-
-impl Lights for OwnShadow<'_> {
-    fn hidden<R: Real>(&self, ray: &Ray<R>, hit: &Hit<R>) -> u8 {
-        let place = hit.place(ray);
-        let is_hidden = |light: &DVec3| {
-            let way = Vec3::of(*light) - place;
-            let far = way.length();
-            let dir = way * (R::of(1.0) / far);
-            let cosine = dir.dot(hit.normal).get();
-            // Lit from behind it is dark by its normal.
-            let faces = (cosine > 0.0) == hit.enters;
-            let from = R::of(2.0 * hit.error / cosine.abs().max(f64::MIN_POSITIVE));
-            let reach = Reach { from, to: far, ..Reach::whole() };
-            faces && self.surface.is_met(&Ray { origin: place, dir }, reach)
-        };
-        self.lights.iter().enumerate().fold(0, |bits, (i, light)| bits | u8::from(is_hidden(light)) << i)
-    }
+    /// The tree has told how the ray goes on that the object turns, and after how many turns. `None` if it does not.
+    Told(Option<(Ray<R>, u32)>),
 }
 
 /// The tree of an object, by what it does to rays.
 enum Tree<'a, R: Real> {
-    Seen(RiTree<FirstHit<'a, OwnShadow<'a>, R>>),
-    Through(RiTree<ExitRay<'a, OwnShadow<'a>, R>>),
+    Seen(RiTree<FirstHit<'a, R>>),
+    Through(RiTree<ExitRay<'a, R>>),
+}
+
+/// Asks an object's tree for one ray after another.
+pub enum Asker<'t, 'a, R: Real> {
+    /// There is no tree.
+    None,
+    /// Of an object that turns no rays.
+    Seen(Descent<'t, FirstHit<'a, R>>),
+    /// Of one that does.
+    Through(Descent<'t, ExitRay<'a, R>>),
 }
 
 /// An object made ready for rays.
@@ -76,7 +58,9 @@ pub struct Seer<'a, R: Real> {
     pub object: &'a Object,
     /// The box around it.
     pub bounds: Bounds,
-    own_shadow: OwnShadow<'a>,
+    /// Where it hides each light, for objects with a tree.
+    shadows: Vec<LightMap<'a>>,
+    lights: Vec<DVec3>,
     optics: Option<Optics>,
     limit: u32,
     tree: Option<Tree<'a, R>>,
@@ -85,24 +69,25 @@ pub struct Seer<'a, R: Real> {
 impl<'a, R: Real> Seer<'a, R> {
     /// An object of a world. `parameters` are those of its tree; `None` for none.
     pub fn new(object: &'a Object, world: &World, parameters: Option<Parameters>) -> Self {
-        // Convex surfaces hide no place of theirs that faces the light.
-        let lights =
-            if object.is_convex { Vec::new() } else { world.lights.iter().map(|l| l.position).collect() };
-        let own_shadow = OwnShadow { surface: &object.surface, lights };
+        let lights: Vec<DVec3> = world.lights.iter().map(|light| light.position).collect();
         let (optics, limit) = (object.material.optics(), world.most_inner_turns);
         let grow = |parameters| {
-            let lines = SurfaceLines::new(&object.surface)?;
+            let by_direction = match optics {
+                Some(Optics::Glass { .. }) => ByDirection::Much,
+                Some(Optics::Mirror) | None => ByDirection::Little,
+            };
+            let lines = SurfaceLines::new(&object.surface, by_direction)?;
             Some(match optics {
-                None => Tree::Seen(RiTree::new(FirstHit::new(lines, own_shadow.clone()), parameters)),
-                Some(optics) => {
-                    let exits = ExitRay::new(lines, own_shadow.clone(), optics, limit);
-                    Tree::Through(RiTree::new(exits, parameters))
-                }
+                None => Tree::Seen(RiTree::new(FirstHit::new(lines), parameters)),
+                Some(optics) => Tree::Through(RiTree::new(ExitRay::new(lines, optics, limit), parameters)),
             })
         };
         let tree = parameters.filter(|_| object.grows).and_then(grow);
+        let threshold = parameters.map_or(0.0, |p| p.distance_threshold);
+        let map = |&light: &DVec3| LightMap::new(&object.surface, light, threshold);
+        let shadows = if tree.is_some() { lights.iter().map(map).collect() } else { Vec::new() };
         let bounds = object.surface.bounds();
-        Self { object, bounds, own_shadow, optics, limit, tree }
+        Self { object, bounds, shadows, lights, optics, limit, tree }
     }
 
     /// Its material.
@@ -122,50 +107,55 @@ impl<'a, R: Real> Seer<'a, R> {
         Some(Sight { t: hit.t, place: hit.place(ray), normal, known: Known::Traced(hit) })
     }
 
-    /// Whether the object is met within reach.
-    pub fn is_met(&self, ray: &Ray<R>, reach: Reach<R>) -> bool {
-        self.object.surface.is_met(ray, reach)
+    /// Whether it hides a light of the world from a place of another object. `ray` leads from there to the light, `far` away.
+    /// Traced, that stops at any hit.
+    pub fn hides(&self, light: usize, ray: &Ray<R>, far: R) -> bool {
+        match self.shadows.get(light) {
+            Some(map) => map.hides(ray.origin),
+            None => self.object.surface.is_met(ray, Reach { to: far, ..Reach::whole() }),
+        }
     }
 
-    /// The same by its tree, for a ray whose origin lies before the object's box. `Err` says why it is to be traced.
-    pub fn ask(&self, ray: &Ray<R>, cache: &Cache) -> Result<Option<Sight<R>>, Reason> {
+    /// Whether it hides a light from a place of its own, seen along `ray`, which faces the light at this cosine.
+    pub fn hides_itself(&self, light: usize, ray: &Ray<R>, sight: &Sight<R>, cosine: R) -> bool {
+        // Convex surfaces hide no place of theirs that faces the light.
+        if self.object.is_convex {
+            return false;
+        }
+        match (self.shadows.get(light), sight.known) {
+            (Some(map), _) => map.hides_itself(sight.place, cosine),
+            (None, Known::Traced(hit)) => self.is_met_again(ray, &hit, self.lights[light]),
+            (None, Known::Told(_)) => false,
+        }
+    }
+
+    /// Whether the way from a hit to a light meets the surface again.
+    fn is_met_again(&self, ray: &Ray<R>, hit: &Hit<R>, light: DVec3) -> bool {
+        let place = hit.place(ray);
+        let way = Vec3::of(light) - place;
+        let far = way.length();
+        let dir = way * (R::of(1.0) / far);
+        let from = R::of(steady_gap(hit.error, dir.dot(hit.normal).get()));
+        self.object.surface.is_met(&Ray { origin: place, dir }, Reach { from, to: far, ..Reach::whole() })
+    }
+
+    /// To ask the tree by rays whose origins lie before the object's box.
+    pub fn asker(&self) -> Asker<'_, 'a, R> {
         match &self.tree {
-            None => Err(Reason::Guard),
-            Some(Tree::Seen(tree)) => {
-                let lines = tree.attribute().lines();
-                let point = lines.point(ray);
-                let seen = answer(tree.query(point, cache))?;
-                Ok(seen.and_then(|seen| sight(lines, ray, point, &seen, |_| None)))
-            }
-            Some(Tree::Through(tree)) => {
-                let exits = tree.attribute();
-                let point = exits.lines().point(ray);
-                let through = answer(tree.query(point, cache))?;
-                Ok(through.and_then(|through| {
-                    let turned =
-                        |place| exits.exit_of(&through, ray, place).map(|exit| (exit, through.turns()));
-                    sight(exits.lines(), ray, point, &through.seen, turned)
-                }))
-            }
+            None => Asker::None,
+            Some(Tree::Seen(tree)) => Asker::Seen(tree.descent()),
+            Some(Tree::Through(tree)) => Asker::Through(tree.descent()),
         }
     }
 
     /// How a ray goes on from a sight. `None` if it does not.
     pub fn turned(&self, ray: &Ray<R>, sight: &Sight<R>) -> Option<(Ray<R>, u32)> {
         match sight.known {
-            Known::Told { turned, .. } => turned,
+            Known::Told(turned) => turned,
             Known::Traced(hit) => {
                 let path = follow(&self.object.surface, ray, hit, self.optics?, self.limit);
                 path.exit.map(|exit| (exit, path.turns))
             }
-        }
-    }
-
-    /// The lights that the object itself hides from a sight, a bit each.
-    pub fn hidden(&self, ray: &Ray<R>, sight: &Sight<R>) -> u8 {
-        match sight.known {
-            Known::Told { hidden, .. } => hidden,
-            Known::Traced(hit) => self.own_shadow.hidden(ray, &hit),
         }
     }
 
@@ -204,6 +194,41 @@ impl<'a, R: Real> Seer<'a, R> {
             None => BuildCounts::default(),
         }
     }
+
+    /// Bytes of tables that do not grow: of samples that may be asked for again, and of what lights see.
+    pub fn table_bytes(&self) -> usize {
+        let memo = match &self.tree {
+            Some(Tree::Seen(_)) => Memo::<Seen>::BYTES,
+            Some(Tree::Through(_)) => Memo::<exit_ray::Known<R>>::BYTES,
+            None => 0,
+        };
+        memo + self.shadows.len() * LightMap::BYTES
+    }
+}
+
+impl<R: Real> Asker<'_, '_, R> {
+    /// The first sight of the object. `Err` says why the ray is to be traced.
+    pub fn ask(&mut self, ray: &Ray<R>, cache: &Cache) -> Result<Option<Sight<R>>, Reason> {
+        match self {
+            Self::None => Err(Reason::Guard),
+            Self::Seen(descent) => {
+                let lines = descent.tree().attribute().lines();
+                let point = lines.point(ray);
+                let seen = answer(descent.query(point, cache))?;
+                Ok(seen.and_then(|seen| sight(lines, ray, point, &seen, |_| None)))
+            }
+            Self::Through(descent) => {
+                let exits = descent.tree().attribute();
+                let point = exits.lines().point(ray);
+                let through = answer(descent.query(point, cache))?;
+                Ok(through.and_then(|through| {
+                    let turned =
+                        |place| exits.exit_of(&through, ray, place).map(|exit| (exit, through.turns()));
+                    sight(exits.lines(), ray, point, &through.seen, turned)
+                }))
+            }
+        }
+    }
 }
 
 /// What a tree says: an output, `None` for a line that passes the box by, or why to trace.
@@ -229,5 +254,5 @@ fn sight<R: Real>(
     let place = ray.at(t);
     let normal = vector(seen.normal);
     let normal = if seen.enters() { normal } else { -normal };
-    Some(Sight { t, place, normal, known: Known::Told { hidden: seen.hidden(), turned: turned(place) } })
+    Some(Sight { t, place, normal, known: Known::Told(turned(place)) })
 }

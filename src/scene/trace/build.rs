@@ -12,7 +12,7 @@ use crate::scene::mesh_file::{self, ReadOptions};
 use crate::scene::text::{SceneText, Step};
 use crate::surface::{BezierPatch, Block, Disc, Shell, SmoothMesh, Sphere, Surface};
 
-/// Lights hidden by an object itself are bits of a byte.
+/// Each object keeps what each light sees of it.
 const MOST_LIGHTS: usize = 8;
 /// All objects are held against each ray.
 const MOST_OBJECTS: usize = 1_000;

@@ -34,13 +34,14 @@ impl Noise {
         let within: [R; 3] = std::array::from_fn(|a| p[a] - R::of(cell[a]));
         let fade = within.map(|x| x * x * x * (x * (x * R::of(6.0) - R::of(15.0)) + R::of(10.0)));
         let from = [within, within.map(|x| x - R::of(1.0))];
+        // By corner, axis and sign: a random sign that is looked up is no branch to be guessed.
+        let signed = from.map(|side| side.map(|x| [x, -x]));
+        let slopes = self.slopes(cell.map(|x| x as i64));
         let corner = |bits: usize| {
-            let off: [usize; 3] = std::array::from_fn(|a| bits >> a & 1);
-            let slope = self.slope(std::array::from_fn(|a| cell[a] as i64 + off[a] as i64));
+            let slope = slopes[bits];
             // Of the three parts of the product one is zero.
-            let part = |a: usize| if slope[a] < 0 { -from[off[a]][a] } else { from[off[a]][a] };
-            let zero = slope.iter().position(|&s| s == 0).unwrap_or(0);
-            part((zero + 1) % 3) + part((zero + 2) % 3)
+            let part = |i: usize| signed[bits >> slope.axes[i] & 1][slope.axes[i]][slope.signs[i]];
+            part(0) + part(1)
         };
         let mix = |a: R, b: R, share: R| a + (b - a) * share;
         let edge = |bits: usize| mix(corner(bits), corner(bits | 1), fade[0]);
@@ -48,8 +49,8 @@ impl Noise {
         mix(face(0), face(4), fade[2])
     }
 
-    /// The gradient at a point of the lattice: one of the twelve to the edges of a cube.
-    fn slope(&self, point: [i64; 3]) -> [i8; 3] {
+    /// The gradients at the corners of a cell of the lattice, by the corner's bits.
+    fn slopes(&self, [x, y, z]: [i64; 3]) -> [Slope; 8] {
         // splitmix64 over the coordinates: cheap, and as good as random for the eye.
         let mix = |hash: u64, x: i64| {
             let z = (hash ^ x as u64).wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -57,12 +58,27 @@ impl Noise {
             let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
             z ^ z >> 31
         };
-        let hash = point.into_iter().fold(self.seed, mix);
-        let (zero, signs) = ((hash % 3) as usize, hash >> 32);
-        let sign = |bit: u64| if signs >> bit & 1 == 0 { 1 } else { -1 };
-        let mut slope = [sign(0), sign(1), 0];
-        slope.swap(2, zero);
-        slope
+        let of_x = [0, 1].map(|i| mix(self.seed, x + i));
+        let of_xy: [u64; 4] = std::array::from_fn(|bits| mix(of_x[bits & 1], y + (bits as i64 >> 1)));
+        std::array::from_fn(|bits| Slope::of(mix(of_xy[bits & 3], z + (bits as i64 >> 2))))
+    }
+}
+
+/// One of the twelve gradients to the edges of a cube: two axes, and for each whether it runs backwards.
+#[derive(Clone, Copy)]
+struct Slope {
+    axes: [usize; 2],
+    signs: [usize; 2],
+}
+
+impl Slope {
+    fn of(hash: u64) -> Self {
+        let [a, b] = [hash >> 32 & 1, hash >> 33 & 1].map(|sign| sign as usize);
+        match hash % 3 {
+            0 => Self { axes: [2, 1], signs: [a, b] },
+            1 => Self { axes: [0, 2], signs: [a, b] },
+            _ => Self { axes: [0, 1], signs: [a, b] },
+        }
     }
 }
 

@@ -4,10 +4,10 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::absorption::{Bodies, Lengths};
 use crate::error::Result;
 use crate::geometry::Real;
 use crate::modes::Control;
+use crate::modes::absorption::{Bodies, Lengths};
 use crate::modes::bench::LENGTHS;
 use crate::modes::bench::curve::views;
 use crate::modes::project::{Interpolation, Method, Projector, TreeSettings};
@@ -229,10 +229,10 @@ impl Subject {
                 let mut found = Vec::new();
                 for (world, camera) in worlds.iter().flat_map(|w| w.cameras.iter().map(move |c| (w, c))) {
                     let start = Instant::now();
-                    let bodies = Bodies::<R>::new(world, tracing);
+                    let bodies = Bodies::<R>::new(world, tracing)?;
                     let lengths = bodies.lengths(camera, *size, &quiet)?;
                     outcome.seconds += start.elapsed().as_secs_f64();
-                    outcome.operations += lengths.operations;
+                    outcome.operations += lengths.work.operations;
                     outcome.add(bodies.tree_bytes(), bodies.build_counts());
                     found.push(lengths);
                 }

@@ -9,7 +9,6 @@
 //! Speed-ups are against tracing every ray, sampling included, as in the paper (§3.2). A sweep is one race, so that
 //! whatever slows the machine slows all its settings; a speed-up is the median of those of the rounds.
 
-mod absorption;
 pub mod direction;
 mod input;
 mod plan;

@@ -1,24 +1,25 @@
 //! The paper's second application: random volumes that are looked through without refraction (§3, Fig. 12).
 //!
 //! For every ray the lengths in all bodies, traced or by one RI-tree per body, and the grey that a pixel shows of them.
+//! Bodies are as smooth as they were made: their tessellations are an ordinary scene's, see [`project`](super::project).
 //! Generic over the number, so that both ways' operations can be counted.
 
 use rayon::prelude::*;
 
 use crate::attributes::smooth_chord::{SmoothChords, chord};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geometry::{Bounds, Ray, Real, Region};
 use crate::modes::Control;
 use crate::modes::project::tiles;
-use crate::modes::raytrace::Tracing;
+use crate::modes::raytrace::{Picture, Tracing, Work};
 use crate::ritree::{Answer, BuildCounts, Cache, RiTree};
-use crate::scene::trace::{Camera, World};
+use crate::scene::trace::{Camera, Object, World};
 use crate::surface::{Slabs, Surface};
 
 /// What is left of the light on the way through half a body's longest side: its opacity is one half (§3.7).
 const LET_THROUGH: f64 = 0.5;
 
-/// A world made ready to be looked through. Its bodies must be closed and convex.
+/// A world made ready to be looked through.
 pub struct Bodies<'a, R: Real> {
     bodies: Vec<Body<'a, R>>,
     cache: Cache,
@@ -39,11 +40,18 @@ pub struct Lengths {
     pub lengths: Vec<f32>,
     /// The grey of each pixel, 1 where nothing is in the way.
     pub greys: Vec<f32>,
-    /// Floating-point operations; 0 unless they were counted.
-    pub operations: u64,
+    /// Whether a body with a tree was traced for the pixel.
+    pub traced: Vec<bool>,
+    /// What it took.
+    pub work: Work,
 }
 
 impl Lengths {
+    /// The greys as a picture of so many columns and rows.
+    pub fn picture(&self, size: (u32, u32)) -> Picture {
+        Picture::of_greys(size, &self.greys, self.traced.clone(), self.work)
+    }
+
     /// The mean difference of lengths over all rays that meet the body in either. 0 if none does.
     pub fn mean_difference(&self, other: &Self) -> f64 {
         let pairs = || self.lengths.iter().zip(&other.lengths).filter(|(a, b)| **a > 0.0 || **b > 0.0);
@@ -54,7 +62,18 @@ impl Lengths {
 
 impl<'a, R: Real> Bodies<'a, R> {
     /// Makes a world ready. Trees that outgrow the cache are not pruned: what does not fit is computed and forgotten.
-    pub fn new(world: &'a World, tracing: Tracing) -> Self {
+    ///
+    /// # Errors
+    /// A body that is not closed and convex: lines may meet it in several stretches, or in none.
+    pub fn new(world: &'a World, tracing: Tracing) -> Result<Self> {
+        let is_body = |object: &Object| object.is_convex && !matches!(object.surface, Surface::Disc(_));
+        if let Some(object) = world.objects.iter().find(|object| !is_body(object)) {
+            return Err(Error::input(
+                format!("object `{}` of {}", object.name, world.name),
+                "is not known to be a closed convex body, so its lengths are not told by two hits",
+                "leave it out, or give a mesh of it to `chordfield project`",
+            ));
+        }
         let (parameters, cache_bytes) = match tracing {
             Tracing::Exact => (None, 0),
             Tracing::RiTree(trees) => (Some(trees.parameters), trees.cache_bytes),
@@ -66,7 +85,7 @@ impl<'a, R: Real> Bodies<'a, R> {
             Body { surface, bounds, unit: 0.5 * bounds.size().max_element(), tree }
         };
         let bodies = world.objects.iter().map(|object| body(&object.surface)).collect();
-        Self { bodies, cache: Cache::new(cache_bytes) }
+        Ok(Self { bodies, cache: Cache::new(cache_bytes) })
     }
 
     /// Looks through all bodies along the rays of one view.
@@ -78,20 +97,26 @@ impl<'a, R: Real> Bodies<'a, R> {
             .into_par_iter()
             .map(|region| {
                 control.check()?;
-                let (tile, operations) = R::count(|| self.tile(camera, size, &region));
-                Ok((region, Lengths { operations, ..tile }))
+                let (mut tile, operations) = R::count(|| self.tile(camera, size, &region));
+                tile.work.operations = operations;
+                control.advance(region.pixels() as u64);
+                Ok((region, tile))
             })
             .collect::<Result<_>>()?;
         let (pixels, bodies) = (size.0 as usize * size.1 as usize, self.bodies.len());
-        let mut all =
-            Lengths { lengths: vec![0.0; bodies * pixels], greys: vec![1.0; pixels], operations: 0 };
+        let mut all = Lengths {
+            lengths: vec![0.0; bodies * pixels],
+            greys: vec![1.0; pixels],
+            traced: vec![false; pixels],
+            work: Work::default(),
+        };
         for (region, tile) in tiles {
             for (i, (column, row)) in region.places().enumerate() {
                 let at = row as usize * size.0 as usize + column as usize;
-                all.greys[at] = tile.greys[i];
+                (all.greys[at], all.traced[at]) = (tile.greys[i], tile.traced[i]);
                 all.lengths[bodies * at..][..bodies].copy_from_slice(&tile.lengths[bodies * i..][..bodies]);
             }
-            all.operations += tile.operations;
+            all.work += tile.work;
         }
         Ok(all)
     }
@@ -101,8 +126,10 @@ impl<'a, R: Real> Bodies<'a, R> {
         for (column, row) in region.places() {
             let ray = camera.ray::<R>(size, f64::from(column) + 0.5, f64::from(row) + 0.5);
             let mut light = R::of(1.0);
+            let traced_before = tile.work.traced;
+            tile.work.rays += 1;
             for body in &self.bodies {
-                let length = body.length(&ray, &self.cache) * R::of(1.0 / body.unit);
+                let length = body.length(&ray, &self.cache, &mut tile.work) * R::of(1.0 / body.unit);
                 if length.get() > 0.0 {
                     // The ray may be at its second body: greys multiply, in whatever order.
                     light = light * R::of(LET_THROUGH).powf(length.get());
@@ -110,6 +137,7 @@ impl<'a, R: Real> Bodies<'a, R> {
                 tile.lengths.push(length.get() as f32);
             }
             tile.greys.push(light.get() as f32);
+            tile.traced.push(tile.work.traced > traced_before);
         }
         tile
     }
@@ -129,19 +157,25 @@ impl<'a, R: Real> Bodies<'a, R> {
 
 impl<R: Real> Body<'_, R> {
     /// The length of a ray of unit direction from outside in the body, mm.
-    fn length(&self, ray: &Ray<R>, cache: &Cache) -> R {
+    fn length(&self, ray: &Ray<R>, cache: &Cache, work: &mut Work) -> R {
         let is_met = Slabs::new(ray).stretch(&self.bounds).is_some_and(|(_, far)| far.get() > 0.0);
         if !is_met {
             return R::of(0.0);
         }
-        let known = self.tree.as_ref().map(|tree| tree.query(tree.attribute().lines().point(ray), cache));
-        match known {
-            Some(None) => R::of(0.0),
-            Some(Some(Answer::Interpolated(known))) => R::of(known.map_or(0.0, |c| c.length.into())),
-            Some(Some(Answer::Trace(_))) | None => {
-                chord(self.surface, ray).map_or(R::of(0.0), |(length, _)| length)
+        if let Some(tree) = &self.tree {
+            work.queries += 1;
+            let known = match tree.query(tree.attribute().lines().point(ray), cache) {
+                None => Some(None),
+                Some(Answer::Interpolated(known)) => Some(known),
+                Some(Answer::Trace(_)) => None,
+            };
+            if let Some(known) = known {
+                work.interpolated += 1;
+                return R::of(known.map_or(0.0, |chord| chord.length.into()));
             }
+            work.traced += 1;
         }
+        chord(self.surface, ray).map_or(R::of(0.0), |(length, _)| length)
     }
 }
 
@@ -151,12 +185,13 @@ mod tests {
     use crate::geometry::Counted;
     use crate::modes::raytrace::Trees;
     use crate::ritree::Parameters;
-    use crate::scene::trace::{Recipe, random_volumes};
+    use crate::scene::trace::{Recipe, open, random_volumes};
 
     const SIZE: (u32, u32) = (30, 20);
 
     fn seen<R: Real>(world: &World, tracing: Tracing) -> Lengths {
-        Bodies::<R>::new(world, tracing).lengths(&world.cameras[0], SIZE, &Control::none()).expect("done")
+        let bodies = Bodies::<R>::new(world, tracing).expect("bodies");
+        bodies.lengths(&world.cameras[0], SIZE, &Control::none()).expect("done")
     }
 
     #[test]
@@ -176,7 +211,13 @@ mod tests {
         for tracing in [Tracing::Exact, trees(0.25)] {
             let (plain, counted) = (seen::<f64>(&world, tracing), seen::<Counted>(&world, tracing));
             assert!(plain.lengths == counted.lengths && plain.greys == counted.greys);
-            assert!(counted.operations > 10_000 && plain.operations == 0);
+            assert!(counted.work.operations > 10_000 && plain.work.operations == 0);
+            let work = plain.work;
+            assert_eq!(work.queries, work.interpolated + work.traced);
+            assert_eq!(plain.traced.iter().any(|t| *t), work.traced > 0);
         }
+        let bowl = open("tomatoes", Recipe { seed: 1, count: 1 }).expect("a world");
+        let refused = Bodies::<f64>::new(&bowl, Tracing::Exact).err().expect("a table is no body");
+        assert!(refused.to_string().contains("table"), "{refused}");
     }
 }
