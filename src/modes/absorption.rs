@@ -91,7 +91,7 @@ impl<'a, R: Real> Bodies<'a, R> {
     /// Looks through all bodies along the rays of one view.
     ///
     /// # Errors
-    /// [`Error::Interrupted`](crate::Error::Interrupted) within a tile's time of a request to stop.
+    /// [`Error::Interrupted`] within a tile's time of a request to stop.
     pub fn lengths(&self, camera: &Camera, size: (u32, u32), control: &Control) -> Result<Lengths> {
         let tiles: Vec<(Region, Lengths)> = tiles(size)
             .into_par_iter()
