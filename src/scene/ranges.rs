@@ -174,6 +174,14 @@ mod tests {
     }
 
     #[test]
+    fn angles_of_thousands_of_turns_and_what_are_no_numbers_are_refused() {
+        assert_eq!(degrees("-1e6,1e6"), [-1e6, 1e6]);
+        for text in ["1e300", "-1e300", "1000001", "inf", "nan"] {
+            assert!(text.parse::<Angles>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
     fn lists_and_ranges_mix_in_the_order_written() {
         assert_eq!(degrees("90, 0,180..200:10"), [90.0, 0.0, 180.0, 190.0, 200.0]);
     }
