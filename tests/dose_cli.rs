@@ -3,8 +3,9 @@
 mod common;
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::Command;
 
+use common::run::chordfield;
 use common::{folder, study_in};
 
 #[test]
@@ -99,15 +100,6 @@ fn bad_studies_are_refused_with_their_line() {
 
 fn studies() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("phantoms/studies")
-}
-
-fn chordfield(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_chordfield"))
-        .current_dir(folder)
-        .args(args)
-        .stdin(Stdio::null())
-        .output()
-        .expect("the program starts")
 }
 
 fn lines(path: &Path) -> Vec<String> {

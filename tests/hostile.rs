@@ -2,16 +2,12 @@
 
 mod common;
 
-use std::path::Path;
 use std::process::{Command, Output};
 
 use common::nested_balls;
+use common::run::chordfield;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_chordfield");
-
-fn chordfield(folder: &Path, args: &[&str]) -> Output {
-    Command::new(PROGRAM).current_dir(folder).args(args).output().expect("the program starts")
-}
 
 fn said(output: &Output) -> String {
     let text = [&output.stdout[..], &output.stderr].concat();

@@ -8,6 +8,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
 use common::nested_balls;
+use common::run::err;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_chordfield");
 
@@ -30,11 +31,6 @@ fn start(folder: &Path, args: &[&str]) -> Child {
         .stderr(Stdio::piped())
         .spawn()
         .expect("the program starts")
-}
-
-fn err(output: &Output) -> String {
-    let text = String::from_utf8_lossy(&output.stderr).replace(['|', '\n'], " ");
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// All files below a folder.

@@ -1,13 +1,10 @@
 //! `--save-trees` and `--load-trees` as a user meets them.
 
-use std::path::Path;
-use std::process::{Command, Output};
+mod common;
 
-/// Runs the program in `folder`.
-fn chordfield(folder: &Path, args: &[&str]) -> Output {
-    let program = env!("CARGO_BIN_EXE_chordfield");
-    Command::new(program).current_dir(folder).args(args).output().expect("the program runs")
-}
+use std::process::Output;
+
+use common::run::chordfield;
 
 fn words(run: &Output) -> String {
     // Lines are broken where they would be too long.

@@ -19,7 +19,7 @@ use super::edge_on::{self, EdgeOn};
 use super::face::Slope;
 use super::pixels::Pixels;
 use super::rows::{Covered, LANES, first_lanes};
-use super::tracer::{Face, SeenFace, Tracer};
+use super::tracer::{Face, FaceRows, SeenFace, Tracer};
 use crate::exact::record::{Passes, Record};
 use crate::geometry::{RayGrid, Upstream};
 
@@ -196,12 +196,7 @@ impl Tracer<'_, '_> {
     /// Notes what a face covers.
     #[inline(always)]
     fn cover_stretches<S: Simd>(&mut self, simd: S, face: &SeenFace, block: &Pixels) {
-        let slope = self.slope_of(face, block);
-        let pixels = self.work.aspect.pixels(face.face).intersection(block);
-        let corners = [0, 1, 2].map(|corner| self.work.aspect.corner(face.face, corner));
-        let is_even = self.work.rows.find(simd, &corners, &pixels, self.seen.crossing_error);
-        let is_right_out = is_even != self.seen.projection.is_mirrored();
-        let slot = self.work.block.faces.len() as u32;
+        let FaceRows { slot, pixels, is_right_out } = self.find_rows(simd, face, block);
         let first = (pixels.rows.start - block.rows.start) as usize;
         let mut is_double = 0;
         for i in 0..pixels.rows.len() {
@@ -212,7 +207,6 @@ impl Tracer<'_, '_> {
             is_double |= self.work.stretches.add(slot, first + i, way, columns);
         }
         self.work.stretches.is_double |= is_double != 0;
-        self.work.block.faces.push(Face { slope, number: face.number });
     }
 
     /// Finds the lengths of a row that is covered once, between these columns of the block.

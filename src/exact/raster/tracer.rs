@@ -124,6 +124,16 @@ pub struct Face {
     pub number: u32,
 }
 
+/// A face of a block whose rows were found.
+pub struct FaceRows {
+    /// Its place among the block's faces.
+    pub slot: u32,
+    /// The pixels of the block that it may cover.
+    pub pixels: Pixels,
+    /// Whether rays leave through it where its long edge is on the left, and enter where it is on the right.
+    pub is_right_out: bool,
+}
+
 /// The pixels of a row that a face covers, each end reckoned in the block's columns.
 #[derive(Clone, Copy, Default)]
 pub struct Span {
@@ -294,12 +304,7 @@ impl<'v, 'a> Tracer<'v, 'a> {
 
     #[inline(always)]
     fn cover_by<S: pulp::Simd>(&mut self, simd: S, face: &SeenFace, block: &Pixels) {
-        let slope = self.slope_of(face, block);
-        let pixels = self.work.aspect.pixels(face.face).intersection(block);
-        let corners = [0, 1, 2].map(|corner| self.work.aspect.corner(face.face, corner));
-        let is_even = self.work.rows.find(simd, &corners, &pixels, self.seen.crossing_error);
-        let is_right_out = is_even != self.seen.projection.is_mirrored();
-        let slot = self.work.block.faces.len() as u32;
+        let FaceRows { slot, pixels, is_right_out } = self.find_rows(simd, face, block);
         let block_spans = &mut self.work.block;
         let needed = block_spans.span_count + pixels.rows.len();
         if block_spans.spans.len() < needed {
@@ -319,7 +324,19 @@ impl<'v, 'a> Tracer<'v, 'a> {
             count += usize::from(covered > 0);
         }
         block_spans.span_count = count;
+    }
+
+    /// Adds a face to the block's, and finds the pixels that it covers, row by row.
+    #[inline(always)]
+    pub fn find_rows<S: pulp::Simd>(&mut self, simd: S, face: &SeenFace, block: &Pixels) -> FaceRows {
+        let slope = self.slope_of(face, block);
+        let pixels = self.work.aspect.pixels(face.face).intersection(block);
+        let corners = [0, 1, 2].map(|corner| self.work.aspect.corner(face.face, corner));
+        let is_even = self.work.rows.find(simd, &corners, &pixels, self.seen.crossing_error);
+        let is_right_out = is_even != self.seen.projection.is_mirrored();
+        let slot = self.work.block.faces.len() as u32;
         self.work.block.faces.push(Face { slope, number: face.number });
+        FaceRows { slot, pixels, is_right_out }
     }
 
     /// The slope of a face.
