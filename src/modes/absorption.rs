@@ -12,7 +12,7 @@ use crate::geometry::{Bounds, Ray, Real, Region};
 use crate::modes::Control;
 use crate::modes::project::tiles;
 use crate::modes::raytrace::{Picture, Tracing, Work};
-use crate::ritree::{Answer, BuildCounts, Cache, RiTree};
+use crate::ritree::{Answer, BuildCounts, Cache, Descent, RiTree};
 use crate::scene::trace::{Camera, Object, World};
 use crate::surface::{Slabs, Surface};
 
@@ -123,13 +123,16 @@ impl<'a, R: Real> Bodies<'a, R> {
 
     fn tile(&self, camera: &Camera, size: (u32, u32), region: &Region) -> Lengths {
         let mut tile = Lengths::default();
+        let mut descents: Vec<_> =
+            self.bodies.iter().map(|body| body.tree.as_ref().map(RiTree::descent)).collect();
         for (column, row) in region.places() {
             let ray = camera.ray::<R>(size, f64::from(column) + 0.5, f64::from(row) + 0.5);
             let mut light = R::of(1.0);
             let traced_before = tile.work.traced;
             tile.work.rays += 1;
-            for body in &self.bodies {
-                let length = body.length(&ray, &self.cache, &mut tile.work) * R::of(1.0 / body.unit);
+            for (body, descent) in self.bodies.iter().zip(&mut descents) {
+                let length =
+                    body.length(&ray, descent.as_mut(), &self.cache, &mut tile.work) * R::of(1.0 / body.unit);
                 if length.get() > 0.0 {
                     // The ray may be at its second body: greys multiply, in whatever order.
                     light = light * R::of(LET_THROUGH).powf(length.get());
@@ -142,9 +145,10 @@ impl<'a, R: Real> Bodies<'a, R> {
         tile
     }
 
-    /// Bytes that the trees hold.
+    /// Bytes that the trees hold, tables beside the cache included.
     pub fn tree_bytes(&self) -> usize {
-        self.cache.used_bytes()
+        let trees = self.bodies.iter().filter(|body| body.tree.is_some()).count();
+        self.cache.used_bytes() + trees * SmoothChords::<R>::TABLE_BYTES
     }
 
     /// What building the trees took.
@@ -157,25 +161,32 @@ impl<'a, R: Real> Bodies<'a, R> {
 
 impl<R: Real> Body<'_, R> {
     /// The length of a ray of unit direction from outside in the body, mm.
-    fn length(&self, ray: &Ray<R>, cache: &Cache, work: &mut Work) -> R {
+    fn length(
+        &self,
+        ray: &Ray<R>,
+        tree: Option<&mut Descent<'_, SmoothChords<'_, R>>>,
+        cache: &Cache,
+        work: &mut Work,
+    ) -> R {
         let is_met = Slabs::new(ray).stretch(&self.bounds).is_some_and(|(_, far)| far.get() > 0.0);
         if !is_met {
             return R::of(0.0);
         }
-        if let Some(tree) = &self.tree {
+        if let Some(tree) = tree {
             work.queries += 1;
-            let known = match tree.query(tree.attribute().lines().point(ray), cache) {
+            let line = tree.tree().attribute().lines().point(ray);
+            let known = match tree.query(line, cache) {
                 None => Some(None),
                 Some(Answer::Interpolated(known)) => Some(known),
                 Some(Answer::Trace(_)) => None,
             };
             if let Some(known) = known {
                 work.interpolated += 1;
-                return R::of(known.map_or(0.0, |chord| chord.length.into()));
+                return known.map_or(R::of(0.0), |chord| chord.length());
             }
             work.traced += 1;
         }
-        chord(self.surface, ray).map_or(R::of(0.0), |(length, _)| length)
+        chord(self.surface, ray).unwrap_or(R::of(0.0))
     }
 }
 
