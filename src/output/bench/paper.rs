@@ -91,14 +91,17 @@ fn heading(sweep: &Sweep) -> String {
 fn page(report: &PaperReport) -> String {
     let terms = "speed-ups are those of rays traced one by one on the same threads over those with trees, sampling included; a \
                  CPU speed-up is the median over rounds, FLOPs are counted, not estimated";
+    let size = match report.scale {
+        1.0 => "pictures as large as the paper's".to_owned(),
+        scale => format!("pictures with {scale} times the paper's columns and rows"),
+    };
     let mut lead = machine(&report.machine, &report.command, report.complete, terms);
     let _ = write!(
         lead,
         "<p>Atalay &amp; Mount, <i>Interpolation over Light Fields with Applications in Computer Graphics</i>: its Tables 1 and \
-         2 and Figures 5 to 8 on this machine, pictures with {} times the paper's columns and rows. Its scenes are made anew from its \
+         2 and Figures 5 to 8 on this machine, {size}. Its scenes are made anew from its \
          description; its machine was of some twenty years ago. Trees are made anew for each view, so that speed-ups grow with the \
-         number of pixels.</p>",
-        report.scale
+         number of pixels.</p>"
     );
     let judged = |sweep: &Sweep| {
         let verdict = sweep.verdict.as_ref()?;
@@ -154,25 +157,29 @@ fn speed_up(row: &Row) -> String {
     or_dash(cpu(row)[0]) + mark
 }
 
+/// Of the questions, how many were answered by interpolation.
+fn percent(row: &Row) -> String {
+    format!("{:.1}", 100.0 * row.interpolated)
+}
+
 fn rows(sweep: &Sweep) -> String {
+    let beside = |ours: String, paper: Option<f64>| {
+        paper.map_or_else(|| ours.clone(), |paper| format!("{ours} <small>({})</small>", short(paper)))
+    };
     let cells = |row: &Row| {
-        format!(
-            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>\
-             <td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+        let cells = [
             short(row.value),
-            or_dash(row.flop_speed_up),
-            or_dash(flop(row)[1]),
-            speed_up(row),
-            or_dash(cpu(row)[1]),
-            short(row.error),
-            or_dash(error(row)[1]),
-            short(row.memory_mb),
-            or_dash(memory(row)[1]),
+            beside(or_dash(row.flop_speed_up), flop(row)[1]),
+            beside(speed_up(row), cpu(row)[1]),
+            beside(short(row.error), error(row)[1]),
+            percent(row),
+            beside(short(row.memory_mb), memory(row)[1]),
             grouped(row.nodes.round() as u64),
             grouped(row.samples.round() as u64),
             short(row.prunes),
             or_dash(row.time.map(|t| t.seconds)),
-        )
+        ];
+        format!("<tr>{}</tr>", cells.map(|cell| format!("<td>{cell}</td>")).concat())
     };
     let body: String = sweep.rows.iter().map(cells).collect();
     let unit = if sweep.input.errors_compare() {
@@ -181,10 +188,10 @@ fn rows(sweep: &Sweep) -> String {
         " The paper's errors are in a unit of length of its own."
     };
     format!(
-        "<div class=\"wide\"><table><thead><tr><th>{}</th><th>speed-up (FLOP)</th><th>paper</th><th>speed-up (CPU)</th>\
-         <th>paper</th><th>error</th><th>paper</th><th>memory, MB</th><th>paper</th><th>nodes</th><th>samples</th>\
-         <th>prunings</th><th>s</th></tr></thead><tbody>{body}</tbody></table></div><p class=\"note\">±: half the distance \
-         between the quartiles of the rounds' speed-ups is over a tenth of their median.{unit}</p>",
+        "<div class=\"wide\"><table><thead><tr><th>{}</th><th>speed-up (FLOP)</th><th>speed-up (CPU)</th><th>error</th>\
+         <th>interpolated, %</th><th>memory, MB</th><th>nodes</th><th>samples</th><th>prunings</th><th>s</th></tr></thead>\
+         <tbody>{body}</tbody></table></div><p class=\"note\">In brackets, the paper's. ±: half the distance between the \
+         quartiles of the rounds' speed-ups is over a tenth of their median.{unit}</p>",
         sweep.dial.title()
     )
 }
@@ -192,8 +199,8 @@ fn rows(sweep: &Sweep) -> String {
 fn csv(report: &PaperReport) -> String {
     let mut text = String::from(
         "input,parameter,value,columns,rows,samples,distance_threshold,angular_threshold_deg,max_depth,cache_bytes,\
-         flop_speed_up,paper_flop_speed_up,cpu_speed_up,paper_cpu_speed_up,cpu_spread,error,paper_error,memory_mb,\
-         paper_memory_mb,nodes,samples_taken,prunes,trees_s,trees_least_s,trees_most_s,exact_s,rounds\n",
+         flop_speed_up,paper_flop_speed_up,cpu_speed_up,paper_cpu_speed_up,cpu_spread,error,paper_error,interpolated,\
+         memory_mb,paper_memory_mb,nodes,samples_taken,prunes,trees_s,trees_least_s,trees_most_s,exact_s,rounds\n",
     );
     let or_nothing = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
     for sweep in &report.sweeps {
@@ -204,7 +211,7 @@ fn csv(report: &PaperReport) -> String {
             let times: Vec<String> = (0..3).map(|i| or_nothing(time.map(|t| t[i]))).collect();
             let _ = writeln!(
                 text,
-                "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+                "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
                 sweep.input.name(),
                 sweep.dial.word(),
                 row.value,
@@ -219,6 +226,7 @@ fn csv(report: &PaperReport) -> String {
                 pair(cpu),
                 or_nothing(row.cpu_speed_up.map(|s| s.spread)),
                 pair(error),
+                row.interpolated,
                 pair(memory),
                 row.nodes,
                 row.samples,
@@ -238,7 +246,7 @@ pub fn table(report: &PaperReport) -> String {
     for sweep in &report.sweeps {
         let _ = writeln!(
             text,
-            "{}\n  {}\n{:>12}{:>10}{:>9}{:>10}{:>9}{:>11}{:>9}{:>10}{:>9}{:>10}",
+            "{}\n  {}\n{:>12}{:>10}{:>9}{:>10}{:>9}{:>11}{:>9}{:>8}{:>10}{:>9}{:>10}",
             heading(sweep),
             setup(sweep),
             sweep.dial.word(),
@@ -248,6 +256,7 @@ pub fn table(report: &PaperReport) -> String {
             "(paper)",
             "error",
             "(paper)",
+            "int., %",
             "MB",
             "(paper)",
             "nodes"
@@ -257,7 +266,7 @@ pub fn table(report: &PaperReport) -> String {
                 |figures: Figures| figures(row)[1].map_or_else(|| "–".into(), |v| format!("({})", short(v)));
             let _ = writeln!(
                 text,
-                "{:>12}{:>10}{:>9}{:>10}{:>9}{:>11}{:>9}{:>10}{:>9}{:>10}",
+                "{:>12}{:>10}{:>9}{:>10}{:>9}{:>11}{:>9}{:>8}{:>10}{:>9}{:>10}",
                 short(row.value),
                 or_dash(row.flop_speed_up),
                 paper(flop),
@@ -265,6 +274,7 @@ pub fn table(report: &PaperReport) -> String {
                 paper(cpu),
                 short(row.error),
                 paper(error),
+                percent(row),
                 short(row.memory_mb),
                 paper(memory),
                 row.nodes.round()

@@ -10,8 +10,8 @@ use crate::modes::Control;
 use crate::modes::absorption::{Bodies, Lengths};
 use crate::modes::bench::LENGTHS;
 use crate::modes::bench::curve::views;
-use crate::modes::project::{Interpolation, Method, Projector, TreeSettings};
-use crate::modes::raytrace::{Picture, Renderer, Samples, Tracing};
+use crate::modes::project::{Interpolation, Method, Projector, QueryCounts, TreeSettings};
+use crate::modes::raytrace::{Picture, Renderer, Samples, Tracing, Work};
 use crate::ritree::BuildCounts;
 use crate::scene::trace::{self, Recipe, World};
 use crate::scene::{Scene, View};
@@ -159,6 +159,10 @@ pub struct Outcome {
     pub seconds: f64,
     /// Floating-point operations, if they were counted.
     pub operations: u64,
+    /// Questions to trees.
+    pub queries: u64,
+    /// Questions that they answered; all others were traced.
+    pub interpolated: u64,
     /// Bytes of nodes and samples.
     pub tree_bytes: usize,
     /// What building took.
@@ -196,7 +200,10 @@ impl Outcome {
         errors.iter().sum::<f64>() / errors.len() as f64
     }
 
-    fn add(&mut self, tree_bytes: usize, build: BuildCounts) {
+    fn add(&mut self, work: Work, tree_bytes: usize, build: BuildCounts) {
+        self.operations += work.operations;
+        self.queries += work.queries;
+        self.interpolated += work.interpolated;
         self.tree_bytes += tree_bytes;
         self.build += build;
         self.views += 1;
@@ -219,8 +226,7 @@ impl Subject {
                     let renderer = Renderer::<R>::new(world, tracing);
                     let picture = renderer.render(camera, *size, samples, &quiet)?;
                     outcome.seconds += start.elapsed().as_secs_f64();
-                    outcome.operations += picture.work().operations;
-                    outcome.add(renderer.tree_bytes(), renderer.build_counts());
+                    outcome.add(picture.work(), renderer.tree_bytes(), renderer.build_counts());
                     pictures.push(picture);
                 }
                 outcome.found = Found::Pictures(pictures);
@@ -232,8 +238,7 @@ impl Subject {
                     let bodies = Bodies::<R>::new(world, tracing)?;
                     let lengths = bodies.lengths(camera, *size, &quiet)?;
                     outcome.seconds += start.elapsed().as_secs_f64();
-                    outcome.operations += lengths.work.operations;
-                    outcome.add(bodies.tree_bytes(), bodies.build_counts());
+                    outcome.add(lengths.work, bodies.tree_bytes(), bodies.build_counts());
                     found.push(lengths);
                 }
                 outcome.found = Found::Lengths(found);
@@ -247,7 +252,12 @@ impl Subject {
                     let projection = projector.project(view, 0, &quiet)?;
                     outcome.seconds += start.elapsed().as_secs_f64();
                     let forest = projector.forest().unwrap_or_default();
-                    outcome.add(forest.tree_bytes, forest.build);
+                    let QueryCounts { queries, interpolated, .. } = projection.queries();
+                    outcome.add(
+                        Work { queries, interpolated, ..Work::default() },
+                        forest.tree_bytes,
+                        forest.build,
+                    );
                     let lengths =
                         (0..scene.organs.len()).flat_map(|organ| projection.own_length_mm(organ)).collect();
                     found.push(Lengths { lengths, ..Lengths::default() });

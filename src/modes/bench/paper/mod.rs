@@ -72,7 +72,7 @@ impl PaperSettings {
     }
 
     fn size(&self, plan: &Plan) -> [u32; 2] {
-        let side = |n: u32| (f64::from(n) * self.scale * plan.share).round().max(LEAST_SIDE) as u32;
+        let side = |n: u32| (f64::from(n) * self.scale).round().max(LEAST_SIDE) as u32;
         plan.input.picture().0.map(side)
     }
 }
@@ -178,6 +178,7 @@ fn row(plan: &Plan, (value, trees): (f64, Trees), outcome: &Outcome, exact: &Out
         memory_mb: outcome.tree_bytes as f64 / views / 1e6,
         nodes: outcome.build.cells() as f64 / views,
         samples: outcome.build.samples_taken as f64 / views,
+        interpolated: outcome.interpolated as f64 / outcome.queries.max(1) as f64,
         prunes: outcome.build.prunes as f64 / views,
         published: published.flatten(),
     }

@@ -79,6 +79,8 @@ pub struct Row {
     pub time: Option<Times>,
     /// The mean error.
     pub error: f64,
+    /// The share of questions that trees answered by interpolation, 0 to 1; other rays are traced and have no error.
+    pub interpolated: f64,
     /// Nodes and samples at the end, MB of 10⁶ bytes, mean of the views.
     pub memory_mb: f64,
     /// Cells looked at, mean of the views: a node each, but where the cache is too small the same ones again.
@@ -90,6 +92,13 @@ pub struct Row {
     /// The paper's figures.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub published: Option<Published>,
+}
+
+impl Row {
+    /// The mean error of what is interpolated. `None` where nothing is.
+    fn error_of_interpolated(&self) -> Option<f64> {
+        (self.interpolated > 0.0).then(|| self.error / self.interpolated)
+    }
 }
 
 /// A ratio of times over rounds.
@@ -138,6 +147,8 @@ impl Sweep {
     /// Says what the rows say.
     pub(super) fn judge(&mut self) {
         let error = self.series("error", |row| Some(row.error), |paper| Some(paper.error));
+        let of_interpolated =
+            self.series("error over the share interpolated", Row::error_of_interpolated, |_| None);
         let cpu = self.series("CPU speed-up", |row| Some(row.cpu_speed_up?.median), |p| Some(p.cpu_speed_up));
         let flop = self.series("FLOP speed-up", |row| row.flop_speed_up, |p| Some(p.flop_speed_up));
         let memory = self.series("memory in MB", |row| Some(row.memory_mb), |paper| paper.memory_mb);
@@ -147,7 +158,13 @@ impl Sweep {
             Dial::DistanceThreshold | Dial::AngularThreshold => {
                 vec![trend(&error, Way::Rises), trend(speed_up, Way::Rises)]
             }
-            Dial::MaxDepth => vec![trend(&error, Way::Falls), trend(&memory, Way::Rises), peak(speed_up)],
+            Dial::MaxDepth => vec![
+                trend(&error, Way::Falls),
+                // With depth fewer rays are traced, whose error is none.
+                trend(&of_interpolated, Way::Falls),
+                trend(&memory, Way::Rises),
+                peak(speed_up),
+            ],
             Dial::CacheSize => {
                 let holds_all = self.rows.iter().find(|row| row.prunes == 0.0).map(|row| row.value);
                 vec![knee(&cpu, holds_all)]
