@@ -13,9 +13,9 @@ use crate::{Contestant, Entrant};
 /// Stretches of a batch, which two threads share.
 const STRETCHES: u32 = 16;
 
-/// Rows of a band of an image, at most: those of the program's tiles. The zeros to which lengths are added are then still in a
-/// cache, and two threads share the bands.
-const BAND_ROWS: usize = 64;
+/// Columns and rows of a tile of an image, at most: the zeros to which lengths are added are then still in the second-level cache, as
+/// those of the program's tiles are, and two threads share the tiles.
+const TILE: [u32; 2] = [640, 64];
 
 /// A contestant leaves the race after this long on one thread, but not before it has run [`LEAST_ROUNDS`].
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -112,10 +112,10 @@ pub fn race_of_organs(entrants: &[Entrant], organs: &Organs, rounds: usize) -> V
 
 fn task<'a>(contestant: &'a dyn Contestant, rays: &'a RaySet) -> Option<Task<'a>> {
     contestant.tracer(rays).is_some().then_some(())?;
-    let parts = rays.parts(match rays {
-        RaySet::Grid(grid) => grid.whole().rows.len().div_ceil(BAND_ROWS) as u32,
-        RaySet::Batch(_) => STRETCHES,
-    });
+    let parts = match rays {
+        RaySet::Grid(grid) => RaySet::tiles(grid, TILE),
+        RaySet::Batch(_) => rays.parts(STRETCHES),
+    };
     Some(Box::new(move |lengths, share| {
         let tracer = contestant.tracer(rays).expect("it took them before");
         let trace = |(part, lengths): (&Region, &mut [f64])| {

@@ -41,6 +41,22 @@ impl RaySet {
             .collect()
     }
 
+    /// All rays of an image in tiles of so many columns and rows, at most, row by row of them.
+    pub fn tiles(grid: &RayGrid, [columns, rows]: [u32; 2]) -> Vec<Region> {
+        let Region { columns: all_columns, rows: all_rows } = grid.whole();
+        let part = |start: u32, size: u32, end: u32| start..(start + size).min(end);
+        let lefts = || all_columns.clone().step_by(columns as usize);
+        all_rows
+            .clone()
+            .step_by(rows as usize)
+            .flat_map(|top| lefts().map(move |left| (left, top)))
+            .map(|(left, top)| Region {
+                columns: part(left, columns, all_columns.end),
+                rows: part(top, rows, all_rows.end),
+            })
+            .collect()
+    }
+
     /// Calls `trace` with each ray of a region and its place in the region's list.
     pub fn each_of(&self, region: &Region, mut trace: impl FnMut(usize, &Segment)) {
         match self {

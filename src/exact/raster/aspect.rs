@@ -7,6 +7,7 @@ use super::face::{Care, Slope};
 use super::patches::{MOST_FACES, MOST_POINTS, Patch};
 use super::pixels::Pixels;
 use super::projection::{Place, Projection};
+use super::small::SMALL;
 use crate::exact::round;
 use crate::geometry::numeric::{greater, lesser};
 
@@ -17,34 +18,24 @@ const _: () = assert!(MOST_POINTS <= POINTS);
 /// A number of each face.
 type OfFaces = [f64; MOST_FACES];
 
-/// An edge of a face, in columns and rows from the least that have any part in the face.
-#[derive(Clone, Copy)]
-pub struct Edge {
-    /// Where it starts.
-    pub from: [f64; 2],
-    /// Where it leads, so turned that the face is on the side of greater columns if it leads to greater rows.
-    pub along: [f64; 2],
-}
-
 /// One patch in the image.
 pub struct Aspect {
     /// Columns, rows and depths of the points.
     points: [[f64; POINTS]; 3],
     /// The same of each face's corners.
-    corners: [[OfFaces; 3]; 3],
+    pub corners: [[OfFaces; 3]; 3],
     /// Ceilings of the corners' columns and rows: the least and the greatest.
-    low: [OfFaces; 2],
-    high: [OfFaces; 2],
+    pub low: [OfFaces; 2],
+    pub high: [OfFaces; 2],
     /// Slopes of depth by column and by row.
-    slopes: [OfFaces; 2],
+    pub slopes: [OfFaces; 2],
     /// Depths that crossings are kept between.
-    lowest: OfFaces,
-    highest: OfFaces,
-    /// Twice the areas, in pixels.
-    areas: OfFaces,
-    /// See [`Edge`]: of each edge's start and direction, in columns and rows.
-    from: [[OfFaces; 2]; 3],
-    along: [[OfFaces; 2]; 3],
+    pub lowest: OfFaces,
+    pub highest: OfFaces,
+    /// Twice the areas, in pixels, positive if corners turn from columns to rows.
+    pub areas: OfFaces,
+    /// 1 for faces of few pixels, some of the block, that need no care; 0 for others.
+    pub small: OfFaces,
     /// Whether the slopes are right.
     is_sure: [bool; MOST_FACES],
     is_near: [bool; MOST_FACES],
@@ -65,8 +56,7 @@ impl Default for Aspect {
             lowest: NONE,
             highest: NONE,
             areas: NONE,
-            from: [[NONE; 2]; 3],
-            along: [[NONE; 2]; 3],
+            small: NONE,
             is_sure: [false; MOST_FACES],
             is_near: [false; MOST_FACES],
             near: [0; MOST_FACES],
@@ -93,10 +83,10 @@ impl Aspect {
         }
     }
 
-    /// Looks at the faces of the patch whose points have places, and lists those that may cover pixels of a block; and at their
-    /// edges, if asked.
+    /// Looks at the faces of the patch whose points have places, and lists those that may cover pixels of a block; but if so
+    /// asked not [`small`](Self::small) ones, which are told apart then.
     #[inline(always)]
-    pub fn look_at_faces<const EDGES: bool>(
+    pub fn look_at_faces<const PART_SMALL: bool>(
         &mut self,
         patch: &Patch,
         block: &Pixels,
@@ -112,8 +102,8 @@ impl Aspect {
         }
         self.find_boxes(block);
         self.find_slopes(care, limits);
-        if EDGES {
-            self.find_edges();
+        if PART_SMALL {
+            self.part_small(patch.corners.len());
         }
         self.near_count = 0;
         for face in 0..patch.corners.len() {
@@ -161,19 +151,18 @@ impl Aspect {
         }
     }
 
+    /// Tells the small ones of the first `count` faces from the others.
     #[inline(always)]
-    fn find_edges(&mut self) {
-        for edge in 0..3 {
-            let (start, end) = (&self.corners[edge], &self.corners[(edge + 1) % 3]);
-            for axis in 0..2 {
-                let (from, along) = (&mut self.from[edge][axis], &mut self.along[edge][axis]);
-                for i in 0..MOST_FACES {
-                    let sign = if self.areas[i] > 0.0 { 1.0 } else { -1.0 };
-                    from[i] = start[axis][i] - self.low[axis][i];
-                    along[i] = sign * (end[axis][i] - start[axis][i]);
-                }
-            }
+    fn part_small(&mut self, count: usize) {
+        let ([left, top], [right, bottom]) = (&self.low, &self.high);
+        for i in 0..MOST_FACES {
+            let is_small =
+                (right[i] - left[i] <= f64::from(SMALL)) & (bottom[i] - top[i] <= f64::from(SMALL));
+            let is_small = is_small & self.is_near[i] & self.is_sure[i];
+            self.small[i] = if is_small { 1.0 } else { 0.0 };
+            self.is_near[i] &= !is_small;
         }
+        self.small[count..].fill(0.0);
     }
 
     /// How many faces may cover pixels of the block.
@@ -186,13 +175,6 @@ impl Aspect {
     #[inline(always)]
     pub fn near(&self, i: usize) -> usize {
         self.near[i] as usize
-    }
-
-    /// The edges of a face, from corner to corner.
-    #[inline(always)]
-    pub fn edges(&self, face: usize) -> [Edge; 3] {
-        let of = |edge: usize, of: &[[OfFaces; 2]; 3]| [of[edge][0][face], of[edge][1][face]];
-        [0, 1, 2].map(|edge| Edge { from: of(edge, &self.from), along: of(edge, &self.along) })
     }
 
     /// The places of some point.
@@ -221,12 +203,6 @@ impl Aspect {
     #[inline(always)]
     pub fn is_sure(&self, face: usize) -> bool {
         self.is_sure[face]
-    }
-
-    /// Twice the area of a face, in pixels, positive if its corners turn from columns to rows.
-    #[inline(always)]
-    pub fn area(&self, face: usize) -> f64 {
-        self.areas[face]
     }
 
     /// The pixels in whose columns and rows a face may cover any.

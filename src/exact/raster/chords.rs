@@ -12,13 +12,14 @@
 
 use pulp::Simd;
 
-use super::aspect::Edge;
 use super::edge_on::{self, EdgeOn};
 use super::face::Slope;
 use super::pixels::Pixels;
 use super::rows::{Covered, LANES, first_lanes, is_any};
-use super::tracer::{RUN, SeenFace, Tracer};
+use super::small::Shelf;
+use super::tracer::{Block, RUN, SeenFace, SeenPatch, Tracer, Workspace};
 use crate::exact::record::{Passes, Record, Way};
+use crate::geometry::numeric::greater;
 use crate::geometry::{RayGrid, Upstream};
 
 /// Pixels of the body's rectangle for each face, at most. Where faces cover more, quotients at once are quicker than depths that
@@ -27,13 +28,6 @@ pub const MOST_PIXELS: usize = 32;
 
 /// Stands for no depth: those are no less than 0. Alike for both ways, so that the length between is 0.
 const UNSET: f64 = -1.0;
-
-/// Faces no larger than this, in columns and rows, are held against all pixels of their box.
-const SMALL: i32 = 4;
-
-/// Sides of edges of small faces err by less: every operand is less than 8, and each of the two products errs by three
-/// roundings of its factors and one of its own, so that the whole errs by less than γ₁₀ · 2 · 8².
-const SIDE_ERROR: f64 = 1e-12;
 
 /// The depths of a block's rays where they enter and where they leave. Unset between blocks.
 #[derive(Default)]
@@ -69,6 +63,20 @@ impl Depths {
         self.entry_at(row, column) + if way == Way::Out { self.plane } else { 0 }
     }
 
+    /// The same of all pixels.
+    fn shelf(&self) -> Shelf {
+        let [first_column, first_row] = self.first.map(f64::from);
+        let pitch = self.pitch as f64;
+        Shelf { origin: LANES as f64 - first_column - first_row * pitch, pitch, plane: self.plane as f64 }
+    }
+
+    /// The pixel whose depth stands there.
+    fn pixel_at(&self, at: usize) -> [i32; 2] {
+        let at = at % self.plane;
+        let (row, column) = ((at / self.pitch) as i32, (at % self.pitch) as i32 - LANES as i32);
+        [self.first[0] + column, self.first[1] + row]
+    }
+
     fn unset(&mut self, row: i32, column: i32) {
         for way in [Way::In, Way::Out] {
             let at = self.at(way, row, column);
@@ -98,10 +106,17 @@ impl Tracer<'_, '_> {
         record: &mut R,
     ) {
         self.work.block.depths.begin(block);
-        self.each_face::<CONE, true>(
+        self.each_patch::<CONE, true>(
             block,
             #[inline(always)]
-            |tracer, face| tracer.mark(simd, face, block),
+            |tracer, patch| {
+                tracer.mark_small(simd, patch, block);
+                tracer.each_face_of(
+                    patch,
+                    #[inline(always)]
+                    |tracer, face| tracer.mark(simd, face, block),
+                );
+            },
         );
         if !self.work.block.edge_on.is_empty() {
             edge_on::sort(&mut self.work.block.edge_on);
@@ -120,12 +135,42 @@ impl Tracer<'_, '_> {
     fn mark<S: Simd>(&mut self, simd: S, face: &SeenFace, block: &Pixels) {
         let slope = self.slope_of(face, block);
         self.work.block.depths.is_any_set = true;
-        let pixels = self.work.aspect.pixels(face.face);
-        let is_small = pixels.columns.len() as i32 <= SMALL && pixels.rows.len() as i32 <= SMALL;
-        if is_small && self.work.aspect.is_sure(face.face) {
-            self.mark_small(simd, face, &slope, &pixels, block);
-        } else {
-            self.mark_rows(simd, face, &slope, &pixels.intersection(block));
+        let pixels = self.work.aspect.pixels(face.face).intersection(block);
+        self.mark_rows(simd, face, &slope, &pixels);
+    }
+
+    /// Marks the depths of the small faces of a patch.
+    #[inline(always)]
+    fn mark_small<S: Simd>(&mut self, simd: S, patch: &SeenPatch, block: &Pixels) {
+        let Workspace { aspect, small, block: Block { depths, edge_on, .. }, .. } = &mut *self.work;
+        let is_mirrored = self.seen.projection.is_mirrored();
+        small.find(simd, aspect, patch.numbers.len(), block, &depths.shelf(), is_mirrored);
+        depths.is_any_set |= !small.marks().is_empty();
+        for mark in small.marks() {
+            let old = &mut depths.planes[mark.at as usize];
+            let is_twice = *old >= 0.0;
+            *old = greater(mark.depth, *old);
+            if is_twice {
+                let [column, row] = depths.pixel_at(mark.at as usize);
+                edge_on.push(EdgeOn { row, column, face: patch.numbers[mark.face as usize] });
+            }
+        }
+        if !self.work.small.in_doubt.is_empty() {
+            self.mark_in_doubt(simd, patch);
+        }
+    }
+
+    /// Marks single pixels by exact signs.
+    #[cold]
+    #[inline(never)]
+    fn mark_in_doubt<S: Simd>(&mut self, simd: S, patch: &SeenPatch) {
+        self.work.block.depths.is_any_set = true;
+        for [face, x, y] in std::mem::take(&mut self.work.small.in_doubt) {
+            let (face, slope) = (face as usize, self.work.aspect.slope(face as usize));
+            let Pixels { columns, rows } = self.work.aspect.pixels(face);
+            let (column, row) = (columns.start + x as i32, rows.start + y as i32);
+            let pixel = Pixels { columns: column..column + 1, rows: row..row + 1 };
+            self.mark_rows(simd, &patch.face(face), &slope, &pixel);
         }
     }
 
@@ -156,76 +201,6 @@ impl Tracer<'_, '_> {
                 }
                 lanes = simd.add_f64s(lanes, simd.splat_f64s(S::F64_LANES as f64));
             }
-        }
-    }
-
-    /// Marks a face that covers few pixels.
-    #[inline(always)]
-    fn mark_small<S: Simd>(
-        &mut self,
-        simd: S,
-        face: &SeenFace,
-        slope: &Slope,
-        pixels: &Pixels,
-        block: &Pixels,
-    ) {
-        let (left, first_row) = (pixels.columns.start, pixels.rows.start);
-        let rows = first_row.max(block.rows.start)..pixels.rows.end.min(block.rows.end);
-        let is_positive = self.work.aspect.area(face.face) > 0.0;
-        let way = if is_positive != self.seen.projection.is_mirrored() { Way::Out } else { Way::In };
-        let edges = self.work.aspect.edges(face.face);
-        let mut of_rows = [[0.0; LANES]; 3];
-        for (of_rows, Edge { from, along }) in of_rows.iter_mut().zip(&edges) {
-            for (height, of_row) in of_rows[..SMALL as usize].iter_mut().enumerate() {
-                *of_row = along[0] * (height as f64 - from[1]);
-            }
-        }
-        let [least, most] = [block.columns.start, block.columns.end - 1].map(|c| f64::from(c - left));
-        for group in (0..SMALL).step_by(S::F64_LANES) {
-            let lanes = simd.add_f64s(simd.splat_f64s(f64::from(group)), first_lanes(simd));
-            let is_in_block = simd.and_m64s(
-                simd.less_than_or_equal_f64s(simd.splat_f64s(least), lanes),
-                simd.less_than_or_equal_f64s(lanes, simd.splat_f64s(most)),
-            );
-            let columns = simd.add_f64s(simd.splat_f64s(f64::from(left)), lanes);
-            // What no edge changes: within them.
-            let mut across = [simd.splat_f64s(0.0); 3];
-            for (across, Edge { from, along }) in across.iter_mut().zip(&edges) {
-                let offsets = simd.sub_f64s(lanes, simd.splat_f64s(from[0]));
-                *across = simd.mul_f64s(simd.splat_f64s(along[1]), offsets);
-            }
-            for row in rows.clone() {
-                let height = (row - first_row) as usize % LANES;
-                let side = |edge: usize| simd.sub_f64s(simd.splat_f64s(of_rows[edge][height]), across[edge]);
-                let (first, second, third) = (side(0), side(1), side(2));
-                let inside = simd.min_f64s(simd.min_f64s(first, second), third);
-                let is_inside = simd.less_than_f64s(simd.splat_f64s(SIDE_ERROR), inside);
-                let may_be = simd.less_than_or_equal_f64s(simd.splat_f64s(-SIDE_ERROR), inside);
-                if is_any(simd, simd.xor_m64s(is_inside, may_be)) {
-                    let columns = left + group..left + group + S::F64_LANES as i32;
-                    let doubtful = Pixels { columns, rows: row..row + 1 };
-                    self.mark_in_doubt(simd, face, slope, &doubtful.intersection(block));
-                    continue;
-                }
-                let depths = slope.depths(simd, slope.row(row), columns);
-                let at = self.work.block.depths.at(way, row, left + group);
-                let old = &mut self.work.block.depths.planes[at..at + S::F64_LANES];
-                let old = &mut S::as_mut_simd_f64s(old).0[0];
-                let is_twice = set(simd, old, depths, simd.and_m64s(is_inside, is_in_block));
-                if is_any(simd, is_twice) {
-                    let first = [left + group, row];
-                    note_twice(simd, &mut self.work.block.edge_on, face.number, first, is_twice);
-                }
-            }
-        }
-    }
-
-    /// Marks some columns of a row by exact signs.
-    #[cold]
-    #[inline(never)]
-    fn mark_in_doubt<S: Simd>(&mut self, simd: S, face: &SeenFace, slope: &Slope, pixels: &Pixels) {
-        if !pixels.is_empty() {
-            self.mark_rows(simd, face, slope, pixels);
         }
     }
 

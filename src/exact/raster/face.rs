@@ -185,10 +185,23 @@ impl Slope {
     /// As [`depth`](Self::depth), at many columns.
     #[inline(always)]
     pub fn depths<S: Simd>(&self, simd: S, of_row: f64, columns: S::f64s) -> S::f64s {
-        let offsets = simd.sub_f64s(columns, simd.splat_f64s(self.base.x));
-        let rise = simd.mul_f64s(simd.splat_f64s(self.per_column), offsets);
-        let depths = simd.add_f64s(simd.splat_f64s(of_row), rise);
-        // As `lesser` and `greater` choose: a depth that is not a number is the face's own.
-        simd.max_f64s(simd.min_f64s(depths, simd.splat_f64s(self.highest)), simd.splat_f64s(self.lowest))
+        let [of_row, per_column, x, lowest, highest] =
+            [of_row, self.per_column, self.base.x, self.lowest, self.highest].map(|of| simd.splat_f64s(of));
+        depths_of(simd, of_row, per_column, x, columns, [lowest, highest])
     }
+}
+
+/// As [`Slope::depth`], of many faces, or at many columns.
+#[inline(always)]
+pub fn depths_of<S: Simd>(
+    simd: S,
+    of_row: S::f64s,
+    per_column: S::f64s,
+    x: S::f64s,
+    columns: S::f64s,
+    [lowest, highest]: [S::f64s; 2],
+) -> S::f64s {
+    let depths = simd.add_f64s(of_row, simd.mul_f64s(per_column, simd.sub_f64s(columns, x)));
+    // As `lesser` and `greater` choose: a depth that is not a number is the face's own.
+    simd.max_f64s(simd.min_f64s(depths, highest), lowest)
 }

@@ -13,7 +13,7 @@
 //! seen as a closed complex of triangles, so that every ray goes in as often as out, whatever the pixels hit.
 //!
 //! Faces that lie together are seen as a patch (`patches`), or passed over as a whole. A length in a convex body is one
-//! quotient of a pixel's two depths: where faces are small, those are kept by pixel (`chords`); where they are large, rows are
+//! quotient of a pixel's two depths: where faces are small, those are kept by pixel (`chords`, `small`); where they are large, rows are
 //! cut where a face ends (`stretches`).
 //!
 //! Scan conversion with the usual fill rule (Pineda 1988, doi:10.1145/54852.378457), made exact as Shewchuk's adaptive
@@ -29,6 +29,7 @@ mod pixels;
 mod projection;
 mod rows;
 mod seen;
+mod small;
 mod stretches;
 mod tracer;
 

@@ -1,16 +1,14 @@
-//! Blocks of a convex body of large faces: each row is cut where the face of the entry changes or that of the exit, and between
-//! the cuts both depths of a pixel are affine.
+//! Blocks of a convex body of large faces: each row is cut where the face of the entry changes, and where that of the exit does.
+//! Between the cuts the depth is affine.
 //!
 //! ```text
 //!   entries  ├───────┤├──────────────┤├─────────┤      A ray goes in once and out once, so that the spans of a row's entries
 //!   exits    ├────────────┤├────────────┤├──────┤      are one after the other from its first pixel to its last, and so
-//!            ╵       ╵    ╵         ╵   ╵ ╵      ╵      are those of its exits. A pixel is written once.
+//!                                                        are those of its exits. A pixel is written once.
 //! ```
 //!
 //! Where rounding has folded the outline, spans of a row may overlap. That is seen before any of its pixels is written: they
 //! are gone through one by one then, and those covered twice in one way are left to the engine for single rays.
-
-use std::marker::PhantomData;
 
 use pulp::Simd;
 
@@ -19,12 +17,12 @@ use super::edge_on::{self, EdgeOn};
 use super::face::Slope;
 use super::pixels::Pixels;
 use super::rows::{Covered, LANES, first_lanes};
-use super::tracer::{Face, FaceRows, SeenFace, Tracer};
+use super::tracer::{FaceRows, SeenFace, Tracer};
 use crate::exact::record::{Passes, Record};
 use crate::geometry::{RayGrid, Upstream};
 
 /// Columns of a block: as large faces reach over many, more than where lists are long.
-pub const BLOCK_COLUMNS: i32 = 512;
+pub const BLOCK_COLUMNS: i32 = 640;
 
 const COLUMNS: usize = BLOCK_COLUMNS as usize;
 
@@ -32,6 +30,9 @@ const COLUMNS: usize = BLOCK_COLUMNS as usize;
 const WORDS: usize = COLUMNS / 64 + 1;
 
 type Bits = [u64; WORDS];
+
+/// A number of each column, with room for lanes that reach beyond the last.
+type OfColumns = [f64; COLUMNS + LANES];
 
 /// What faces cover of a block, by row and way, and what is found of a row.
 pub struct Stretches {
@@ -42,8 +43,8 @@ pub struct Stretches {
     pitch: usize,
     /// Whether two spans of one row and way start, or end, at the same column.
     is_double: bool,
-    /// Lengths, entries and exits, mm.
-    found: [[f64; COLUMNS + LANES]; 3],
+    /// Lengths, entries and exits, mm; before that, depths of entries and exits.
+    found: [OfColumns; 3],
 }
 
 impl Default for Stretches {
@@ -102,13 +103,6 @@ impl Row {
     }
 }
 
-/// The first if `is_first` is 1, the second if it is 0.
-#[inline(always)]
-fn either(is_first: u64, first: u32, second: u32) -> u32 {
-    let mask = (is_first as u32).wrapping_neg();
-    first & mask | second & !mask
-}
-
 /// The columns whose bits are set.
 #[inline(always)]
 fn columns_of(bits: Bits) -> impl Iterator<Item = usize> {
@@ -159,7 +153,7 @@ impl Tracer<'_, '_> {
     ) {
         self.work.stretches.begin(block);
         self.work.block.faces.clear();
-        self.each_face::<CONE, false>(
+        self.each_face::<CONE>(
             block,
             #[inline(always)]
             |tracer, face| tracer.cover_stretches(simd, face, block),
@@ -178,7 +172,7 @@ impl Tracer<'_, '_> {
             let [first, last] = match self.work.stretches.rows[i].covered_once().filter(|_| !is_folded) {
                 Some([first, last]) if first == last => continue,
                 Some(columns) => {
-                    self.measure_stretches::<CONE, S, R>(simd, block, i, columns);
+                    self.measure_row::<CONE, S, R>(simd, block, i, columns);
                     columns
                 }
                 None => self.measure_one_by_one::<CONE>(block, row),
@@ -209,9 +203,10 @@ impl Tracer<'_, '_> {
         self.work.stretches.is_double |= is_double != 0;
     }
 
-    /// Finds the lengths of a row that is covered once, between these columns of the block.
+    /// Finds the lengths of a row that is covered once, between these columns of the block: first both depths of its pixels, span
+    /// by span, then what follows from them.
     #[inline(always)]
-    fn measure_stretches<const CONE: bool, S: Simd, R: Record>(
+    fn measure_row<const CONE: bool, S: Simd, R: Record>(
         &mut self,
         simd: S,
         block: &Pixels,
@@ -220,38 +215,37 @@ impl Tracer<'_, '_> {
     ) {
         let Stretches { rows, faces, pitch, found, .. } = &mut self.work.stretches;
         let row = block.rows.start + i as i32;
-        let mut found = Found::<CONE, R> {
-            rays: RowOfRays::new(&self.view.grid, row),
-            first: block.columns.start,
-            found,
-            asks: PhantomData,
-        };
-        let [ins, outs] = &rows[i].starts;
-        let (of_ins, of_outs) = faces[2 * i * *pitch..2 * (i + 1) * *pitch].split_at(*pitch);
-        let faces_seen = &self.work.block.faces;
-        // At the first column both change.
-        let ([mut face_in, mut face_out], mut from) = ([of_ins[first], of_outs[first]], first);
-        for (word, (&ins, &outs)) in ins.iter().zip(outs).enumerate().skip(first / 64) {
-            let mut bits = ins | outs;
-            // The end of the row ends the last stretch.
-            if last / 64 == word {
-                bits |= 1 << (last % 64);
-            }
-            while bits != 0 {
-                let bit = bits.trailing_zeros() as usize;
-                bits &= bits - 1;
-                let to = 64 * word + bit;
-                let entry = Depths::new(&faces_seen[face_in as usize], row);
-                let exit = Depths::new(&faces_seen[face_out as usize], row);
-                found.measure(simd, &entry, &exit, [from, to]);
-                if to == last {
-                    return;
-                }
+        let [lengths, entries, exits] = found;
+        for (way, depths) in [&mut *entries, &mut *exits].into_iter().enumerate() {
+            let faces = &faces[(2 * i + way) * *pitch..][..*pitch];
+            let starts = &rows[i].starts[way];
+            let faces_seen = &self.work.block.faces;
+            let mut spans = Spans { depths, row, first: block.columns.start };
+            let mut from = first;
+            // At the row's first column a span starts.
+            for to in columns_of(*starts).skip(1).chain([last]) {
+                let slope = &faces_seen[faces[from] as usize].slope;
+                spans.fill(simd, slope, [from, to]);
                 from = to;
-                // By bits: no branch could foresee which of the two changes.
-                face_in = either(ins >> bit & 1, of_ins[from], face_in);
-                face_out = either(outs >> bit & 1, of_outs[from], face_out);
             }
+        }
+        let rays = RowOfRays::new(&self.view.grid, row);
+        let first_column = simd.splat_f64s(f64::from(block.columns.start + first as i32));
+        let mut columns = simd.add_f64s(first_column, first_lanes(simd));
+        for at in (first..last).step_by(S::F64_LANES) {
+            let (a, b) = (load(simd, entries, at), load(simd, exits, at));
+            let of_rays = rays.lengths::<CONE, S>(simd, columns);
+            let share = if CONE {
+                simd.div_f64s(simd.sub_f64s(a, b), simd.mul_f64s(a, b))
+            } else {
+                simd.sub_f64s(b, a)
+            };
+            store(simd, lengths, at, simd.mul_f64s(of_rays, share));
+            if R::ASKS_ENDS {
+                store(simd, entries, at, place::<CONE, S>(simd, of_rays, a));
+                store(simd, exits, at, place::<CONE, S>(simd, of_rays, b));
+            }
+            columns = simd.add_f64s(columns, simd.splat_f64s(S::F64_LANES as f64));
         }
     }
 
@@ -278,7 +272,7 @@ impl Tracer<'_, '_> {
         }
     }
 
-    /// As [`measure_stretches`](Self::measure_stretches), of any row; pixels covered twice have no length.
+    /// As [`measure_row`](Self::measure_row), of any row; pixels covered twice have no length.
     #[cold]
     #[inline(never)]
     fn measure_one_by_one<const CONE: bool>(&mut self, block: &Pixels, row: i32) -> [usize; 2] {
@@ -317,68 +311,42 @@ impl Tracer<'_, '_> {
     }
 }
 
-/// What is found of a row.
-struct Found<'f, const CONE: bool, R> {
-    rays: RowOfRays,
+/// Depths of a row's pixels in one way.
+struct Spans<'d> {
+    depths: &'d mut OfColumns,
+    row: i32,
     /// The block's first column.
     first: i32,
-    found: &'f mut [[f64; COLUMNS + LANES]; 3],
-    asks: PhantomData<R>,
 }
 
-impl<const CONE: bool, R: Record> Found<'_, CONE, R> {
-    /// Between these columns of the block, rays enter at the one depth and leave at the other. What is found beyond the end is
-    /// written again by the next stretch.
+impl Spans<'_> {
+    /// Between these columns of the block, rays go through one face. What is found beyond the end is written again by the next.
     #[inline(always)]
-    fn measure<S: Simd>(&mut self, simd: S, entry: &Depths, exit: &Depths, [from, to]: [usize; 2]) {
+    fn fill<S: Simd>(&mut self, simd: S, slope: &Slope, [from, to]: [usize; 2]) {
+        let of_row = slope.row(self.row);
         let first = simd.splat_f64s(f64::from(self.first + from as i32));
         let mut columns = simd.add_f64s(first, first_lanes(simd));
         for at in (from..to).step_by(S::F64_LANES) {
-            let (a, b) = (entry.at(simd, columns), exit.at(simd, columns));
-            let lengths = self.rays.lengths::<CONE, S>(simd, columns);
-            let share = if CONE {
-                simd.div_f64s(simd.sub_f64s(a, b), simd.mul_f64s(a, b))
-            } else {
-                simd.sub_f64s(b, a)
-            };
-            self.store(simd, 0, at, simd.mul_f64s(lengths, share));
-            if R::ASKS_ENDS {
-                self.store(simd, 1, at, place::<CONE, S>(simd, lengths, a));
-                self.store(simd, 2, at, place::<CONE, S>(simd, lengths, b));
-            }
+            store(simd, self.depths, at, slope.depths(simd, of_row, columns));
             columns = simd.add_f64s(columns, simd.splat_f64s(S::F64_LANES as f64));
         }
     }
+}
 
-    #[inline(always)]
-    fn store<S: Simd>(&mut self, _: S, of: usize, at: usize, values: S::f64s) {
-        S::as_mut_simd_f64s(&mut self.found[of][at..at + S::F64_LANES]).0[0] = values;
-    }
+#[inline(always)]
+fn load<S: Simd>(_: S, of: &OfColumns, at: usize) -> S::f64s {
+    S::as_simd_f64s(&of[at..at + S::F64_LANES]).0[0]
+}
+
+#[inline(always)]
+fn store<S: Simd>(_: S, of: &mut OfColumns, at: usize, values: S::f64s) {
+    S::as_mut_simd_f64s(&mut of[at..at + S::F64_LANES]).0[0] = values;
 }
 
 /// Places at these depths on rays of these lengths.
 #[inline(always)]
 fn place<const CONE: bool, S: Simd>(simd: S, lengths: S::f64s, depths: S::f64s) -> S::f64s {
     if CONE { simd.div_f64s(lengths, depths) } else { simd.mul_f64s(lengths, depths) }
-}
-
-/// The depth over a face in a row.
-#[derive(Clone, Copy)]
-struct Depths<'f> {
-    slope: &'f Slope,
-    of_row: f64,
-}
-
-impl<'f> Depths<'f> {
-    #[inline(always)]
-    fn new(face: &'f Face, row: i32) -> Self {
-        Self { slope: &face.slope, of_row: face.slope.row(row) }
-    }
-
-    #[inline(always)]
-    fn at<S: Simd>(&self, simd: S, columns: S::f64s) -> S::f64s {
-        self.slope.depths(simd, self.of_row, columns)
-    }
 }
 
 /// The rays of a row.

@@ -16,6 +16,7 @@ use super::pixels::Pixels;
 use super::projection::Place;
 use super::rows::{Covered, Rows};
 use super::seen::Seen;
+use super::small::SmallFaces;
 use super::stretches::{self, Stretches};
 use crate::exact::record::{Record, Way};
 use crate::geometry::Region;
@@ -42,6 +43,7 @@ pub struct Workspace {
     pub aspect: Aspect,
     pub rows: Rows,
     pub stretches: Stretches,
+    pub small: SmallFaces,
     /// Patches near a row of blocks, and near a block.
     near: [Vec<u32>; 2],
 }
@@ -116,6 +118,21 @@ pub struct SeenFace {
     limits: [f64; 2],
     /// Whether the pixels on it are listed if it is edge-on.
     is_known: bool,
+}
+
+/// A patch some of whose faces may cover pixels of a block.
+pub struct SeenPatch<'p> {
+    /// Of the faces, in the surface.
+    pub numbers: &'p [u32],
+    limits: [f64; 2],
+    is_known: bool,
+}
+
+impl SeenPatch<'_> {
+    #[inline(always)]
+    pub fn face(&self, face: usize) -> SeenFace {
+        SeenFace { face, number: self.numbers[face], limits: self.limits, is_known: self.is_known }
+    }
 }
 
 /// A face whose spans are listed.
@@ -248,14 +265,28 @@ impl<'v, 'a> Tracer<'v, 'a> {
         }
     }
 
-    /// Goes through the faces that may cover pixels of the block, and begins the list of rays to be traced by themselves with
-    /// those that lie in the faces of patches on a line of pixels.
-    /// Their edges are found if asked for.
+    /// Goes through the faces that may cover pixels of the block, and begins the list of rays to be traced by themselves.
     #[inline(always)]
-    pub fn each_face<const CONE: bool, const EDGES: bool>(
+    pub fn each_face<const CONE: bool>(
         &mut self,
         block: &Pixels,
         mut each: impl FnMut(&mut Self, &SeenFace),
+    ) {
+        self.each_patch::<CONE, false>(
+            block,
+            #[inline(always)]
+            |tracer, patch| tracer.each_face_of(patch, &mut each),
+        );
+    }
+
+    /// Goes through the patches that may cover pixels of the block once their faces were looked at, and begins the list of rays
+    /// to be traced by themselves with those that lie in the faces of patches on a line of pixels. Small faces are told
+    /// apart if asked.
+    #[inline(always)]
+    pub fn each_patch<const CONE: bool, const PART_SMALL: bool>(
+        &mut self,
+        block: &Pixels,
+        mut each: impl FnMut(&mut Self, &SeenPatch),
     ) {
         self.work.block.edge_on.clear();
         let near = std::mem::take(&mut self.work.near[1]);
@@ -269,13 +300,19 @@ impl<'v, 'a> Tracer<'v, 'a> {
             if is_known {
                 self.look_along(&patch, block);
             }
-            self.work.aspect.look_at_faces::<EDGES>(&patch, block, seen.care, limits);
-            for i in 0..self.work.aspect.near_count() {
-                let face = self.work.aspect.near(i);
-                each(self, &SeenFace { face, number: patch.numbers[face], limits, is_known });
-            }
+            self.work.aspect.look_at_faces::<PART_SMALL>(&patch, block, seen.care, limits);
+            each(self, &SeenPatch { numbers: patch.numbers, limits, is_known });
         }
         self.work.near[1] = near;
+    }
+
+    /// Goes through the faces of the patch that is looked at.
+    #[inline(always)]
+    pub fn each_face_of(&mut self, patch: &SeenPatch, mut each: impl FnMut(&mut Self, &SeenFace)) {
+        for i in 0..self.work.aspect.near_count() {
+            let face = self.work.aspect.near(i);
+            each(self, &patch.face(face));
+        }
     }
 
     /// Lists the pixels on edge-on faces of the patch that is looked at.
@@ -295,7 +332,7 @@ impl<'v, 'a> Tracer<'v, 'a> {
     pub fn cover<const CONE: bool, S: pulp::Simd>(&mut self, simd: S, block: &Pixels) {
         self.work.block.faces.clear();
         self.work.block.span_count = 0;
-        self.each_face::<CONE, false>(
+        self.each_face::<CONE>(
             block,
             #[inline(always)]
             |tracer, face| tracer.cover_by(simd, face, block),

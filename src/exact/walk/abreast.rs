@@ -19,13 +19,13 @@ use super::{Face, LineView, Pass, Seeds, Standing, Unsure, Walker, cross};
 pub(super) const ABREAST: usize = 32;
 
 /// Walks that are longer are left to the walk proper.
-const MOST_STEPS: usize = 24;
+pub(super) const MOST_STEPS: usize = 24;
 
 /// Two walks of a ray: to its entry and to its exit.
 const WALKS: usize = 2 * ABREAST;
 
 /// Where an edge's number counted from another edge leads.
-const ROUND: [usize; 5] = [0, 1, 2, 0, 1];
+pub(super) const ROUND: [usize; 5] = [0, 1, 2, 0, 1];
 
 /// Walks under way.
 pub(super) struct Ranks {

@@ -17,7 +17,7 @@
 
 mod abreast;
 mod climb;
-mod held;
+mod cone;
 mod seeds;
 mod sets;
 #[cfg(test)]

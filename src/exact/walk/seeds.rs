@@ -13,6 +13,7 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::abreast::ABREAST;
+use super::cone::OfRows;
 use super::{Face, LineView, Seeds, Walker};
 use crate::exact::round;
 use crate::geometry::numeric::{gamma, greater, lesser};
@@ -152,9 +153,24 @@ impl SeedTable {
     /// Whether the line from `o` along `d`, mm, passes the ball by that holds the body, and so misses, surely.
     #[inline]
     pub fn passes_by(&self, o: DVec3, d: DVec3) -> bool {
-        let (o, d) = (self.to_ball * (o - self.middle), self.to_ball * d);
+        self.beyond_ball(self.to_ball * (o - self.middle), d) > 0.0
+    }
+
+    /// The same of lines from one point, of all rows: those that surely miss have positive numbers.
+    #[inline(always)]
+    pub fn beyond(&self, o: DVec3, dirs: &[OfRows; 3], beyond: &mut OfRows) {
+        let o = self.to_ball * (o - self.middle);
+        for (i, beyond) in beyond.iter_mut().enumerate() {
+            *beyond = self.beyond_ball(o, DVec3::new(dirs[0][i], dirs[1][i], dirs[2][i]));
+        }
+    }
+
+    /// Squared, and less what might be rounding; `o` in the ball's frame.
+    #[inline(always)]
+    fn beyond_ball(&self, o: DVec3, d: DVec3) -> f64 {
+        let d = self.to_ball * d;
         let foot = o - (o.dot(d) / d.length_squared()) * d;
-        foot.length_squared() > self.holding_squared + PASSING_BY * o.length_squared()
+        foot.length_squared() - (self.holding_squared + PASSING_BY * o.length_squared())
     }
 
     /// The face at which the ball's plane across `normal` would touch.

@@ -3,7 +3,7 @@
 use std::hint::black_box;
 
 use super::abreast::{ABREAST, Ranks};
-use super::held::{Alone, Followers, Holding};
+use super::cone::ConeRays;
 use super::{Pass, Seeds, Unsure, Walker};
 use crate::exact::raster::pixels_around;
 use crate::exact::{Record, Way};
@@ -15,14 +15,8 @@ const FACES_IN_CACHE: usize = 10_000;
 /// Over bodies of as many faces walks wait for memory.
 const MANY_FACES: usize = 80_000;
 
-/// Bodies of as many faces have none that serves many rays of an image.
-const FINE_FACES: usize = 5_000;
-
 /// Faces for each pixel of the body's rectangle from which on walks begin by the table.
 const SPARSE_FACES: u64 = 2;
-
-/// Fewer rows are walked sooner one by one than abreast.
-const WORTH_IT: usize = 8;
 
 impl Walker {
     /// Records the crossings of each ray of `region`, numbered row by row, in any order; rays in doubt go to `other`.
@@ -33,15 +27,16 @@ impl Walker {
         record: &mut R,
         other: impl FnMut(usize, &Segment, &mut R),
     ) {
-        let is_coarse = self.faces.len() < FINE_FACES;
+        // From pixel to pixel would then be farther than from the table's face.
+        let (low, high) = (self.centre - self.reach, self.centre + self.reach);
+        let pixels = pixels_around(&Bounds::of([low, high]), grid);
+        let is_sparse = self.faces.len() as u64 > SPARSE_FACES * pixels;
         match grid.upstream() {
-            Upstream::Source(source) if is_coarse => {
-                self.trace_rows(grid, region, record, other, &mut Followers::new(source));
+            Upstream::Source(source) if !is_sparse => {
+                let rays = ConeRays { walker: self, grid, source, region, record, other };
+                crate::dispatch::arch().dispatch(rays);
             }
-            _ if region.rows.len() < WORTH_IT => {
-                self.trace_rows(grid, region, record, other, &mut Alone);
-            }
-            _ => self.trace_rows_abreast(grid, region, record, other),
+            _ => self.trace_rows_abreast(grid, region, record, other, is_sparse),
         }
     }
 
@@ -52,11 +47,8 @@ impl Walker {
         region: &Region,
         record: &mut R,
         mut other: impl FnMut(usize, &Segment, &mut R),
+        is_sparse: bool,
     ) {
-        // From pixel to pixel would then be farther than from the table's face.
-        let (low, high) = (self.centre - self.reach, self.centre + self.reach);
-        let pixels = pixels_around(&Bounds::of([low, high]), grid);
-        let is_sparse = self.faces.len() as u64 > SPARSE_FACES * pixels;
         let mut ranks = Ranks::default();
         for top in region.rows.clone().step_by(ABREAST) {
             let rows = top..region.rows.end.min(top + ABREAST as u32);
@@ -89,56 +81,6 @@ impl Walker {
                         Err(Unsure) => other(ray, &grid.segment(column, row), record),
                     }
                 }
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn trace_rows<R: Record>(
-        &self,
-        grid: &RayGrid,
-        region: &Region,
-        record: &mut R,
-        mut other: impl FnMut(usize, &Segment, &mut R),
-        held: &mut impl Holding,
-    ) {
-        let mut of_row = None;
-        let mut ray = 0;
-        for row in region.rows.clone() {
-            // Each row begins where the one above began.
-            let (mut seeds, mut missed) = (of_row, true);
-            held.forget();
-            for column in region.columns.clone() {
-                let target = grid.point(column, row);
-                let origin = grid.start_of(target);
-                let dir = target - origin;
-                if let Some(pass) = held.pass(dir) {
-                    note(record, ray, &pass, UNIT, dir.length());
-                    missed = false;
-                    ray += 1;
-                    continue;
-                }
-                let before = seeds;
-                // Where one ray misses, the next may pass by far enough to say so at once.
-                let answer = if missed && self.seeds.passes_by(origin, dir) {
-                    Ok(None)
-                } else {
-                    let near = seeds.get_or_insert_with(|| self.seeds.near(origin, dir).unwrap_or(FIRST));
-                    let answer = self.pass_from(origin, dir, near);
-                    of_row = of_row.filter(|_| column != region.columns.start).or(seeds);
-                    answer
-                };
-                missed = answer == Ok(None);
-                if let (Some(from), Ok(Some(pass))) = (before, answer) {
-                    held.walked(self, from, &pass);
-                }
-                match answer {
-                    // The direction reaches from the source to the target: the segment is 0 to 1.
-                    Ok(Some(pass)) => note(record, ray, &pass, UNIT, dir.length()),
-                    Ok(None) => {}
-                    Err(Unsure) => other(ray, &grid.segment(column, row), record),
-                }
-                ray += 1;
             }
         }
     }
@@ -197,15 +139,12 @@ impl Walker {
     }
 }
 
-/// Seeds as good as none.
-const FIRST: Seeds = Seeds { entry: 0, exit: 0 };
-
 /// A whole path, in its own length.
-const UNIT: Interval = Interval::UNIT;
+pub(super) const UNIT: Interval = Interval::UNIT;
 
 /// Records a pass, cut to the reach of its ray.
 #[inline]
-fn note(record: &mut impl Record, ray: usize, pass: &Pass, reach: Interval, unit_mm: f64) {
+pub(super) fn note(record: &mut impl Record, ray: usize, pass: &Pass, reach: Interval, unit_mm: f64) {
     if let Some(part) = pass.chord.intersection(&reach).filter(|part| part.length() > 0.0) {
         record.crossing(ray, part.start() * unit_mm, pass.entry_face, Way::In);
         record.crossing(ray, part.end() * unit_mm, pass.exit_face, Way::Out);
