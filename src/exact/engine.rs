@@ -2,7 +2,7 @@
 
 use super::raster::{self, RasterView};
 use super::{Body, Record};
-use crate::geometry::{RayGrid, Region};
+use crate::geometry::{RayGrid, Region, Upstream};
 
 /// An exact engine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
@@ -28,7 +28,7 @@ mod cost {
     /// To look at a face.
     const RASTER_FACE: f64 = 11.0;
     /// To find what it covers, by as many rows as a square of its pixels has.
-    const RASTER_ROW: f64 = 46.0;
+    const RASTER_ROW: f64 = 34.0;
     /// To find lengths from that, for each pixel of the body's rectangle.
     const RASTER_PIXEL: f64 = 2.2;
 
@@ -37,10 +37,17 @@ mod cost {
         RASTER_FACE * faces + RASTER_ROW * (faces * pixels).sqrt() + RASTER_PIXEL * pixels
     }
 
-    /// To walk for so many pixels, each from its neighbour, which is many faces away if pixels are few; then from a table.
+    /// To walk for so many pixels, one row after the other or from no one point, each from its neighbour, which is many faces
+    /// away if pixels are few; then from a table.
     pub fn walk(faces: f64, pixels: f64) -> f64 {
         let from_pixel_to_pixel = 80.0 * (faces * pixels).sqrt();
         (40.0 + 3.0 * faces.sqrt().sqrt()) * pixels + from_pixel_to_pixel.min(110.0 * pixels)
+    }
+
+    /// The same from one point, many rows abreast.
+    pub fn walk_of_cone(faces: f64, pixels: f64) -> f64 {
+        let from_pixel_to_pixel = 60.0 * (faces * pixels).sqrt();
+        (2.0 + 1.6 * faces.sqrt().sqrt()) * pixels + from_pixel_to_pixel.min(115.0 * pixels)
     }
 
     /// To descend the hierarchy for each pixel.
@@ -58,7 +65,7 @@ pub struct ImageCost {
     pub ns: f64,
     /// Pixels of the rectangle that the body is seen in.
     pub pixels: f64,
-    /// One of them by a walk.
+    /// One of them by a walk along its row.
     pub walked_pixel_ns: f64,
 }
 
@@ -93,9 +100,10 @@ impl Body {
         let pixels = raster::pixels_around(&self.bounds(), grid) as f64;
         let faces = self.surface().mesh().faces.len() as f64;
         let walk = cost::walk(faces, pixels);
-        let (other, cost) = match self.convexity() {
-            Ok(_) => (Engine::Walk, walk),
-            Err(_) => (Engine::Bvh, cost::bvh(faces, pixels)),
+        let (other, cost) = match (self.convexity(), grid.upstream()) {
+            (Ok(_), Upstream::Source(_)) => (Engine::Walk, cost::walk_of_cone(faces, pixels)),
+            (Ok(_), Upstream::Path(_)) => (Engine::Walk, walk),
+            (Err(_), _) => (Engine::Bvh, cost::bvh(faces, pixels)),
         };
         let raster = cost::raster(faces, pixels);
         let (engine, ns) = if cost < raster { (other, cost) } else { (Engine::Raster, raster) };

@@ -3,8 +3,8 @@
 //! | engine | bodies | rays | serves unasked | cost |
 //! |---|---|---|---|---|
 //! | [`clip`] | convex | any | up to a hundred planes | 1.5 to 2.3 ns a plane: the reference |
-//! | [`walk`] | convex | any | more planes; images of few pixels | 40 to 180 ns a ray of an image, 170 to 600 ns another |
-//! | [`raster`] | any closed surface | of an image | images | 11 ns a face, 46 ns a row of its pixels, 2 ns a pixel |
+//! | [`walk`] | convex | any | more planes; images of few pixels | 15 to 150 ns a ray of an image, 100 to 250 ns another |
+//! | [`raster`] | any closed surface | of an image | images | 11 ns a face, 34 ns a row of its pixels, 2 ns a pixel |
 //! | [`bvh`] | any closed surface | any | bodies that are not convex | 200 to 600 ns a ray of an image, up to 2 µs another |
 //!
 //! Costs are those of one thread, for bodies of a thousand to a third of a million faces (`benches`).

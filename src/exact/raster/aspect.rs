@@ -93,11 +93,11 @@ impl Aspect {
         care: Care,
         limits: [f64; 2],
     ) {
-        for (face, corners) in patch.corners.iter().enumerate() {
-            for (of_corner, &point) in self.corners.iter_mut().zip(corners) {
-                for (of, points) in of_corner.iter_mut().zip(&self.points) {
-                    of[face] = points[point as usize];
-                }
+        for (face, &[a, b, c]) in patch.corners.iter().enumerate().take(MOST_FACES) {
+            for (axis, points) in self.points.iter().enumerate() {
+                self.corners[0][axis][face] = points[a as usize];
+                self.corners[1][axis][face] = points[b as usize];
+                self.corners[2][axis][face] = points[c as usize];
             }
         }
         self.find_boxes(block);

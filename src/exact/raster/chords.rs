@@ -17,14 +17,15 @@ use super::face::Slope;
 use super::pixels::Pixels;
 use super::rows::{Covered, LANES, first_lanes, is_any};
 use super::small::Shelf;
-use super::tracer::{Block, RUN, SeenFace, SeenPatch, Tracer, Workspace};
+use super::tracer::{RUN, SeenFace, SeenPatch, Tracer};
+use super::workspace::{Block, Workspace};
 use crate::exact::record::{Passes, Record, Way};
 use crate::geometry::numeric::greater;
 use crate::geometry::{RayGrid, Upstream};
 
 /// Pixels of the body's rectangle for each face, at most. Where faces cover more, quotients at once are quicker than depths that
 /// are gone through again.
-pub const MOST_PIXELS: usize = 32;
+pub const MOST_PIXELS: usize = 16;
 
 /// Stands for no depth: those are no less than 0. Alike for both ways, so that the length between is 0.
 const UNSET: f64 = -1.0;

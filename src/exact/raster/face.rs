@@ -185,9 +185,9 @@ impl Slope {
     /// As [`depth`](Self::depth), at many columns.
     #[inline(always)]
     pub fn depths<S: Simd>(&self, simd: S, of_row: f64, columns: S::f64s) -> S::f64s {
-        let [of_row, per_column, x, lowest, highest] =
-            [of_row, self.per_column, self.base.x, self.lowest, self.highest].map(|of| simd.splat_f64s(of));
-        depths_of(simd, of_row, per_column, x, columns, [lowest, highest])
+        let splat = |x: f64| simd.splat_f64s(x);
+        let limits = [splat(self.lowest), splat(self.highest)];
+        depths_of(simd, splat(of_row), splat(self.per_column), splat(self.base.x), columns, limits)
     }
 }
 

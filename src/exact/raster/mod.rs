@@ -32,6 +32,7 @@ mod seen;
 mod small;
 mod stretches;
 mod tracer;
+mod workspace;
 
 use std::borrow::Cow;
 
@@ -39,7 +40,8 @@ pub use patches::Patches;
 use pixels::Pixels;
 use projection::{Projection, Sight};
 use seen::Seen;
-use tracer::{Tracer, Workspaces};
+use tracer::Tracer;
+use workspace::Workspaces;
 
 use super::bvh;
 use super::record::Record;

@@ -16,10 +16,6 @@ impl Pixels {
         rows: Range { start: i32::MAX, end: i32::MIN },
     };
 
-    pub fn is_empty(&self) -> bool {
-        self.columns.is_empty() || self.rows.is_empty()
-    }
-
     /// The least rectangle that holds both.
     pub fn union(&self, other: &Self) -> Self {
         let both = |a: &Range<i32>, b: &Range<i32>| a.start.min(b.start)..a.end.max(b.end);

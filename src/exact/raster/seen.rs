@@ -162,15 +162,16 @@ impl pulp::WithSimd for Look<'_> {
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> Vec<PatchSight> {
         let mut aspect = Aspect::default();
-        let sight = |patch: usize| {
+        let mut sights = Vec::with_capacity(self.range.len());
+        for patch in self.range {
             let patch = self.patches.get(patch);
             let count = patch.points[0].len();
             aspect.place_points(&patch, self.projection, self.patches.are_places());
-            PatchSight {
+            sights.push(PatchSight {
                 around: aspect.pixels_of_points(count).grown(1),
                 is_on_a_line: aspect.is_near_a_line(count, self.near_a_line),
-            }
-        };
-        self.range.map(sight).collect()
+            });
+        }
+        sights
     }
 }

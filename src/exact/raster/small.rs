@@ -23,8 +23,8 @@ pub const SMALL: i32 = 4;
 /// roundings of its factors and one of its own, so that the whole errs by less than γ₁₀ · 2 · 8².
 const SIDE_ERROR: f64 = 1e-12;
 
-/// Pixels that the small faces of a patch may cover, and one more to write to.
-const MOST_MARKS: usize = MOST_FACES * (SMALL * SMALL) as usize + 1;
+/// Pixels that the small faces of a patch may cover, and more to write to; a power of two.
+const MOST_MARKS: usize = 2 * MOST_FACES * (SMALL * SMALL) as usize;
 
 /// A pixel that a face covers.
 #[derive(Clone, Copy, Default)]
@@ -100,31 +100,34 @@ impl SmallFaces {
         if !is_any(simd, is_small) {
             return;
         }
-        let [low_column, low_row] = aspect.low.each_ref().map(of);
-        let [columns, rows] = [0, 1].map(|axis| {
+        let (low_column, low_row) = (of(&aspect.low[0]), of(&aspect.low[1]));
+        let extent = |axis: usize| {
             let extent = simd.sub_f64s(of(&aspect.high[axis]), of(&aspect.low[axis]));
             simd.select_f64s(is_small, extent, splat(0.0))
-        });
+        };
+        let (columns, rows) = (extent(0), extent(1));
         let is_positive = simd.less_than_f64s(splat(0.0), of(&aspect.areas));
         let sign = simd.select_f64s(is_positive, splat(1.0), splat(-1.0));
         let way = if is_mirrored { [0.0, shelf.plane] } else { [shelf.plane, 0.0] };
         let way = simd.select_f64s(is_positive, splat(way[0]), splat(way[1]));
-        let corners = aspect.corners.each_ref().map(|corner| [of(&corner[0]), of(&corner[1])]);
-        let edges = [0, 1, 2].map(|edge| {
-            let ([x, y], [to_x, to_y]) = (corners[edge], corners[(edge + 1) % 3]);
+        let corner = |i: usize| [of(&aspect.corners[i][0]), of(&aspect.corners[i][1])];
+        let corners = [corner(0), corner(1), corner(2)];
+        let edge = |from: usize, to: usize| {
+            let ([x, y], [to_x, to_y]) = (corners[from], corners[to]);
+            let along = [simd.sub_f64s(to_x, x), simd.sub_f64s(to_y, y)];
             Edge {
                 from: [simd.sub_f64s(x, low_column), simd.sub_f64s(y, low_row)],
-                along: [simd.sub_f64s(to_x, x), simd.sub_f64s(to_y, y)]
-                    .map(|along| simd.mul_f64s(sign, along)),
+                along: [simd.mul_f64s(sign, along[0]), simd.mul_f64s(sign, along[1])],
             }
-        });
+        };
+        let edges = [edge(0, 1), edge(1, 2), edge(2, 0)];
         let [base_x, base_y] = corners[0];
         let base_depth = of(&aspect.corners[0][2]);
-        let [per_column, per_row] = aspect.slopes.each_ref().map(of);
+        let (per_column, per_row) = (of(&aspect.slopes[0]), of(&aspect.slopes[1]));
         let limits = [of(&aspect.lowest), of(&aspect.highest)];
-        let [left, right, top, bottom] =
-            [block.columns.start, block.columns.end, block.rows.start, block.rows.end]
-                .map(|place| splat(f64::from(place)));
+        let (left, right) = (splat(f64::from(block.columns.start)), splat(f64::from(block.columns.end)));
+        let (top, bottom) = (splat(f64::from(block.rows.start)), splat(f64::from(block.rows.end)));
+        let mut marked = self.count;
         for y in 0..SMALL {
             let y_in_box = splat(f64::from(y));
             let is_row = simd.less_than_f64s(y_in_box, rows);
@@ -133,7 +136,8 @@ impl SmallFaces {
             }
             let row = simd.add_f64s(low_row, y_in_box);
             let is_row = simd.and_m64s(is_row, is_between(simd, top, row, bottom));
-            let of_row = edges.each_ref().map(|edge| edge.of_row(simd, y_in_box));
+            let of_row = |edge: usize| edges[edge].of_row(simd, y_in_box);
+            let of_row = [of_row(0), of_row(1), of_row(2)];
             let depth_of_row = simd.add_f64s(base_depth, simd.mul_f64s(per_row, simd.sub_f64s(row, base_y)));
             let at_row = simd.mul_f64s(row, splat(shelf.pitch));
             let at_row = simd.add_f64s(simd.add_f64s(at_row, splat(shelf.origin + round::WHOLE)), way);
@@ -156,14 +160,24 @@ impl SmallFaces {
                 }
                 let depths = depths_of(simd, depth_of_row, per_column, base_x, column, limits);
                 let is_marked = simd.and_m64s(is_candidate, is_inside);
-                self.list(simd, is_marked, group, simd.add_f64s(at_row, column), depths);
+                let found = [simd.add_f64s(at_row, column), depths];
+                marked = self.list(simd, is_marked, group, found, marked);
             }
         }
+        self.count = marked;
     }
 
-    /// Lists those that are marked.
+    /// Lists those that are marked, after `count` others. How many there are then: were that kept in memory, each lane would wait
+    /// for the last.
     #[inline(always)]
-    fn list<S: Simd>(&mut self, simd: S, is_marked: S::m64s, group: usize, at: S::f64s, depths: S::f64s) {
+    fn list<S: Simd>(
+        &mut self,
+        simd: S,
+        is_marked: S::m64s,
+        group: usize,
+        [at, depths]: [S::f64s; 2],
+        mut count: usize,
+    ) -> usize {
         let (mut places, mut values, mut any) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         let one =
             simd.select_f64s(is_marked, simd.splat_f64s(round::WHOLE + 1.0), simd.splat_f64s(round::WHOLE));
@@ -173,10 +187,11 @@ impl SmallFaces {
         for lane in 0..S::F64_LANES {
             // Written in any case: whether it counts could not be foreseen.
             let face = (group * S::F64_LANES + lane) as u32;
-            self.marks[self.count] =
+            self.marks[count % MOST_MARKS] =
                 Mark { at: round::whole(places[lane]) as u32, face, depth: values[lane] };
-            self.count += round::whole(any[lane]) as usize;
+            count += round::whole(any[lane]) as usize;
         }
+        count
     }
 
     #[cold]

@@ -218,16 +218,20 @@ impl Tracer<'_, '_> {
         let [lengths, entries, exits] = found;
         for (way, depths) in [&mut *entries, &mut *exits].into_iter().enumerate() {
             let faces = &faces[(2 * i + way) * *pitch..][..*pitch];
-            let starts = &rows[i].starts[way];
             let faces_seen = &self.work.block.faces;
             let mut spans = Spans { depths, row, first: block.columns.start };
             let mut from = first;
-            // At the row's first column a span starts.
-            for to in columns_of(*starts).skip(1).chain([last]) {
-                let slope = &faces_seen[faces[from] as usize].slope;
-                spans.fill(simd, slope, [from, to]);
-                from = to;
+            for (word, &bits) in rows[i].starts[way].iter().enumerate().skip(first / 64) {
+                // At the row's first column the first span starts, which ends where the next does.
+                let mut bits = if word == first / 64 { bits & !(1 << (first % 64)) } else { bits };
+                while bits != 0 {
+                    let to = 64 * word + bits.trailing_zeros() as usize;
+                    bits &= bits - 1;
+                    spans.fill(simd, &faces_seen[faces[from] as usize].slope, [from, to]);
+                    from = to;
+                }
             }
+            spans.fill(simd, &faces_seen[faces[from] as usize].slope, [from, last]);
         }
         let rays = RowOfRays::new(&self.view.grid, row);
         let first_column = simd.splat_f64s(f64::from(block.columns.start + first as i32));

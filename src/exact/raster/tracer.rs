@@ -4,20 +4,18 @@
 //! faces cover is then a list without gaps, gone through without a surprise at each face.
 
 use std::ops::Range;
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::RasterView;
-use super::aspect::Aspect;
-use super::chords::{Depths, measure};
+use super::chords::measure;
 use super::edge_on::{self, EdgeOn, is_edge_on, is_listed, pixels_along};
 use super::face::Slope;
 use super::patches::Patch;
 use super::pixels::Pixels;
 use super::projection::Place;
-use super::rows::{Covered, Rows};
+use super::rows::Covered;
 use super::seen::Seen;
-use super::small::SmallFaces;
-use super::stretches::{self, Stretches};
+use super::stretches;
+use super::workspace::{Face, Span, Workspace};
 use crate::exact::record::{Record, Way};
 use crate::geometry::Region;
 
@@ -36,49 +34,6 @@ pub struct Tracer<'v, 'a> {
     pub work: Box<Workspace>,
 }
 
-/// What a tracer writes to. It may serve another afterwards.
-#[derive(Default)]
-pub struct Workspace {
-    pub block: Block,
-    pub aspect: Aspect,
-    pub rows: Rows,
-    pub stretches: Stretches,
-    pub small: SmallFaces,
-    /// Patches near a row of blocks, and near a block.
-    near: [Vec<u32>; 2],
-}
-
-/// Workspaces that no tracer uses: to make them anew for each tile would take as long as a part of the tile.
-#[derive(Default)]
-pub struct Workspaces(Mutex<Vec<Box<Workspace>>>);
-
-impl Workspaces {
-    fn take(&self) -> Box<Workspace> {
-        self.lock().pop().unwrap_or_default()
-    }
-
-    fn give_back(&self, workspace: Box<Workspace>) {
-        self.lock().push(workspace);
-    }
-
-    /// Lists are whole whatever happens to those who hold the lock.
-    fn lock(&self) -> MutexGuard<'_, Vec<Box<Workspace>>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Clone for Workspaces {
-    fn clone(&self) -> Self {
-        Self::default()
-    }
-}
-
-impl std::fmt::Debug for Workspaces {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_tuple("Workspaces").field(&self.lock().len()).finish()
-    }
-}
-
 /// A tracer at work.
 struct Widely<'t, 'v, 'a, R> {
     tracer: &'t mut Tracer<'v, 'a>,
@@ -92,20 +47,6 @@ impl<R: Record> pulp::WithSimd for Widely<'_, '_, '_, R> {
     fn with_simd<S: pulp::Simd>(self, simd: S) {
         self.tracer.trace_blocks(simd, self.record);
     }
-}
-
-/// What is known of a block. Empty between blocks.
-#[derive(Default)]
-pub struct Block {
-    /// Of the rays, mm.
-    lengths: Vec<f64>,
-    pub faces: Vec<Face>,
-    /// The first `span_count` are in use.
-    spans: Vec<Span>,
-    span_count: usize,
-    /// Rays to be traced by themselves.
-    pub edge_on: Vec<EdgeOn>,
-    pub depths: Depths,
 }
 
 /// A face that may cover pixels of a block.
@@ -135,12 +76,6 @@ impl SeenPatch<'_> {
     }
 }
 
-/// A face whose spans are listed.
-pub struct Face {
-    pub slope: Slope,
-    pub number: u32,
-}
-
 /// A face of a block whose rows were found.
 pub struct FaceRows {
     /// Its place among the block's faces.
@@ -149,24 +84,6 @@ pub struct FaceRows {
     pub pixels: Pixels,
     /// Whether rays leave through it where its long edge is on the left, and enter where it is on the right.
     pub is_right_out: bool,
-}
-
-/// The pixels of a row that a face covers, each end reckoned in the block's columns.
-#[derive(Clone, Copy, Default)]
-pub struct Span {
-    pub face: u32,
-    pub row: i32,
-    pub start: i16,
-    pub end: i16,
-    pub is_out: bool,
-}
-
-impl Block {
-    /// What faces cover.
-    #[inline(always)]
-    pub fn spans(&self) -> &[Span] {
-        &self.spans[..self.span_count]
-    }
 }
 
 /// How the rays of a block are traced.
@@ -275,7 +192,14 @@ impl<'v, 'a> Tracer<'v, 'a> {
         self.each_patch::<CONE, false>(
             block,
             #[inline(always)]
-            |tracer, patch| tracer.each_face_of(patch, &mut each),
+            |tracer, patch| {
+                // Not lent: a function that is called through a reference has to do without the wide instructions.
+                tracer.each_face_of(
+                    patch,
+                    #[inline(always)]
+                    |tracer, face| each(tracer, face),
+                );
+            },
         );
     }
 

@@ -18,6 +18,9 @@ use super::{Face, LineView, Pass, Seeds, Standing, Unsure, Walker, cross};
 /// Rays that are walked abreast.
 pub(super) const ABREAST: usize = 32;
 
+/// A number of each of them.
+pub(super) type OfRays = [f64; ABREAST];
+
 /// Walks that are longer are left to the walk proper.
 pub(super) const MOST_STEPS: usize = 24;
 

@@ -13,20 +13,19 @@
 use glam::DVec3;
 use pulp::Simd;
 
-use super::abreast::{ABREAST, MOST_STEPS, ROUND};
+use super::abreast::{ABREAST, OfRays};
+use super::held::{Footing, HeldFaces, NONE, dir_of, dot, load, set, store};
 use super::sets::{UNIT, note};
-use super::{Face, Pass, STEEP, Seeds, Unsure, Walker};
+use super::{Pass, Seeds, Unsure, Walker};
 use crate::exact::Record;
 use crate::geometry::numeric::gamma;
 use crate::geometry::{Interval, RayGrid, Region, Segment};
 
-/// A number of each row.
-pub(super) type OfRows = [f64; ABREAST];
-
-const NONE: OfRows = [0.0; ABREAST];
-
 /// No instructions handle more numbers side by side.
 const LANES: usize = 8;
+
+// Lanes are gone through in plain loops here, and lists of them written out: what is called once more, as by `array::map`, may
+// have to do without the wide instructions.
 
 /// The rays of a region of an image from one source.
 pub(super) struct ConeRays<'t, R, F> {
@@ -65,12 +64,7 @@ impl<R: Record, F: FnMut(usize, &Segment, &mut R)> ConeRays<'_, R, F> {
             (top - self.region.rows.start) as usize * width + (column - self.region.columns.start) as usize;
         for j in (0..rows.count).filter(|&j| !rows.passes_by[j]) {
             let (ray, length_mm) = (first + j * width, rows.lengths[j]);
-            if let Some(pass) = rows.pass(j) {
-                rows.has_missed[j] = false;
-                note(self.record, ray, &pass, UNIT, length_mm);
-                continue;
-            }
-            let answer = rows.pass_from_there(j);
+            let answer = rows.pass(j).map_or_else(|| rows.pass_from_there(j), |pass| Ok(Some(pass)));
             rows.has_missed[j] = answer == Ok(None);
             match answer {
                 Ok(Some(pass)) => note(self.record, ray, &pass, UNIT, length_mm),
@@ -89,12 +83,12 @@ struct Rows<'w> {
     sure: f64,
     count: usize,
     /// What the rows add to a column's first point.
-    offsets: [OfRows; 3],
+    offsets: [OfRays; 3],
     /// From the source to the pixels' points.
-    dirs: [OfRows; 3],
-    lengths: OfRows,
+    dirs: [OfRays; 3],
+    lengths: OfRays,
     /// |x| + |y| + |z| of the directions.
-    sizes: OfRows,
+    sizes: OfRays,
     entries: HeldFaces,
     exits: HeldFaces,
     /// Whether the row's rays have faces to begin with.
@@ -135,8 +129,7 @@ impl<'w> Rows<'w> {
         self.count = count;
         let [_, by_row] = grid.steps();
         for j in 0..ABREAST {
-            let offset = (f64::from(top) + j as f64) * by_row;
-            self.offsets.iter_mut().zip(offset.to_array()).for_each(|(of, x)| of[j] = x);
+            set(&mut self.offsets, j, (f64::from(top) + j as f64) * by_row);
         }
         self.has_faces = [false; ABREAST];
         self.has_missed = [true; ABREAST];
@@ -149,15 +142,18 @@ impl<'w> Rows<'w> {
         let first = (grid.origin() + f64::from(column) * by_column).to_array();
         let source = self.source.to_array();
         for group in 0..self.count.next_multiple_of(LANES) / S::F64_LANES {
-            let dir = [0, 1, 2].map(|axis| {
+            let along = |axis: usize| {
                 let point =
                     simd.add_f64s(simd.splat_f64s(first[axis]), load(simd, &self.offsets[axis], group));
                 simd.sub_f64s(point, simd.splat_f64s(source[axis]))
-            });
-            let [x, y, z] = dir.map(|x| simd.abs_f64s(x));
-            store(simd, &mut self.sizes, group, simd.add_f64s(simd.add_f64s(x, y), z));
+            };
+            let dir = [along(0), along(1), along(2)];
+            let sum = simd.add_f64s(simd.abs_f64s(dir[0]), simd.abs_f64s(dir[1]));
+            store(simd, &mut self.sizes, group, simd.add_f64s(sum, simd.abs_f64s(dir[2])));
             store(simd, &mut self.lengths, group, simd.sqrt_f64s(dot(simd, dir, dir)));
-            self.dirs.iter_mut().zip(dir).for_each(|(of, x)| store(simd, of, group, x));
+            for axis in 0..3 {
+                store(simd, &mut self.dirs[axis], group, dir[axis]);
+            }
         }
         self.pass_by();
     }
@@ -236,181 +232,4 @@ impl<'w> Rows<'w> {
         let mut seeds = Seeds { entry: self.entries.half_edges[j] / 4, exit: self.exits.half_edges[j] / 4 };
         self.walker.pass_from(self.source, dir_of(&self.dirs, j), &mut seeds)
     }
-}
-
-/// The faces that rays go through in one way, one of each row.
-struct HeldFaces {
-    /// −1 if rays enter through them, 1 if they leave.
-    sign: f64,
-    /// 4 · face + the edge that planes are counted from.
-    half_edges: [u32; ABREAST],
-    /// Normals, inward, of the planes through the source and each edge, by edge and axis.
-    sides: [[OfRows; 3]; 3],
-    normals: [OfRows; 3],
-    /// Of the faces' planes over the source, mm.
-    heights: OfRows,
-    /// Those of the rays' directions with the normals of the sides.
-    products: [OfRows; 3],
-    /// Positive where the face is surely pierced, and not seen nearly edge-on.
-    margins: OfRows,
-    /// Where rays go through the faces' planes, in the unit of their directions.
-    crossings: OfRows,
-}
-
-impl HeldFaces {
-    fn new(sign: f64) -> Self {
-        Self {
-            sign,
-            half_edges: [0; ABREAST],
-            sides: [[NONE; 3]; 3],
-            normals: [NONE; 3],
-            heights: NONE,
-            products: [NONE; 3],
-            margins: NONE,
-            crossings: NONE,
-        }
-    }
-
-    /// Finds out which faces are pierced.
-    #[inline(always)]
-    fn look<S: Simd>(&mut self, simd: S, groups: usize, dirs: &[OfRows; 3], sizes: &OfRows, sure: f64) {
-        for group in 0..groups {
-            let dir = load_vector(simd, dirs, group);
-            let [first, second, third] =
-                self.sides.each_ref().map(|side| dot(simd, load_vector(simd, side, group), dir));
-            let least = simd.min_f64s(simd.min_f64s(first, second), third);
-            let doubt = simd.mul_f64s(simd.splat_f64s(sure), load(simd, sizes, group));
-            store(simd, &mut self.margins, group, simd.sub_f64s(least, doubt));
-            let products = self.products.iter_mut().zip([first, second, third]);
-            products.for_each(|(of, product)| store(simd, of, group, product));
-        }
-    }
-
-    /// Finds out where.
-    #[inline(always)]
-    fn cross<S: Simd>(&mut self, simd: S, groups: usize, dirs: &[OfRows; 3], sizes: &OfRows) {
-        for group in 0..groups {
-            let slope = dot(simd, load_vector(simd, &self.normals, group), load_vector(simd, dirs, group));
-            let crossing = simd.div_f64s(load(simd, &self.heights, group), slope);
-            store(simd, &mut self.crossings, group, crossing);
-            let steep = simd.mul_f64s(simd.splat_f64s(STEEP), load(simd, sizes, group));
-            let over = simd.sub_f64s(simd.mul_f64s(slope, simd.splat_f64s(self.sign)), steep);
-            let margin = simd.min_f64s(load(simd, &self.margins, group), over);
-            store(simd, &mut self.margins, group, margin);
-        }
-    }
-
-    /// Walks to the face that a row's ray surely pierces; at the outline, and where that is in doubt, it stays where it is.
-    #[inline(always)]
-    fn walk(&mut self, walker: &Walker, source: DVec3, j: usize, dir: DVec3, sure: f64) {
-        let mut at = Footing {
-            half_edge: self.half_edges[j],
-            corners: corners_from(walker, source, self.half_edges[j]),
-            sides: self.sides.each_ref().map(|side| dir_of(side, j)),
-        };
-        let mut products = self.products.each_ref().map(|of| of[j]);
-        for _ in 0..MOST_STEPS {
-            let edge = least_of(products);
-            if products[edge] > -sure {
-                break;
-            }
-            let next = at.beyond(walker, source, edge, self.sign);
-            products = next.sides.map(|side| side.dot(dir));
-            let is_on = products[0] + products[1] + products[2] > 0.0;
-            if !is_on {
-                break;
-            }
-            at = next;
-        }
-        self.stand_on(walker, source, j, &at);
-        self.margins[j] = products[least_of(products)] - sure;
-    }
-
-    /// Holds the face for a row.
-    #[inline(always)]
-    fn stand_on(&mut self, walker: &Walker, source: DVec3, j: usize, at: &Footing) {
-        let Face { corners, normal, .. } = walker.faces[at.half_edge as usize / 4];
-        self.half_edges[j] = at.half_edge;
-        for (of_side, side) in self.sides.iter_mut().zip(at.sides) {
-            of_side.iter_mut().zip(side.to_array()).for_each(|(of, x)| of[j] = x);
-        }
-        self.normals.iter_mut().zip(normal.to_array()).for_each(|(of, x)| of[j] = x);
-        self.heights[j] = normal.dot(walker.vertices[corners[0] as usize] - source);
-    }
-}
-
-/// A face that a walk has come to.
-#[derive(Clone, Copy)]
-struct Footing {
-    /// 4 · face + the edge that corners and sides are counted from.
-    half_edge: u32,
-    /// From the source, mm.
-    corners: [DVec3; 3],
-    /// As of [`HeldFaces`].
-    sides: [DVec3; 3],
-}
-
-impl Footing {
-    fn new(walker: &Walker, source: DVec3, face: u32, sign: f64) -> Self {
-        let corners = corners_from(walker, source, 4 * face);
-        let [a, b, c] = corners;
-        let sides = [a.cross(b), b.cross(c), c.cross(a)].map(|side| sign * side);
-        Self { half_edge: 4 * face, corners, sides }
-    }
-
-    /// The face beyond an edge, counted from that.
-    #[inline(always)]
-    fn beyond(&self, walker: &Walker, source: DVec3, edge: usize, sign: f64) -> Self {
-        let Face { twins, apexes, .. } = &walker.faces[self.half_edge as usize / 4];
-        let edge_of_face = ROUND[(self.half_edge as usize % 4 + edge).min(4)];
-        let apex = walker.vertices[apexes[edge_of_face] as usize] - source;
-        let (a, b) = (self.corners[ROUND[edge + 1]], self.corners[edge]);
-        Self {
-            half_edge: twins[edge_of_face],
-            corners: [a, b, apex],
-            sides: [-self.sides[edge], sign * b.cross(apex), sign * apex.cross(a)],
-        }
-    }
-}
-
-/// The corners of a face from the source, mm, counted from an edge.
-#[inline(always)]
-fn corners_from(walker: &Walker, source: DVec3, half_edge: u32) -> [DVec3; 3] {
-    let corners = walker.faces[half_edge as usize / 4].corners;
-    let first = half_edge as usize % 4;
-    [0, 1, 2].map(|i| walker.vertices[corners[ROUND[(first + i).min(4)]] as usize] - source)
-}
-
-/// Which of three is the least.
-#[inline(always)]
-fn least_of([s0, s1, s2]: [f64; 3]) -> usize {
-    if s0 <= s1 && s0 <= s2 { 0 } else { 1 + usize::from(s2 < s1) }
-}
-
-/// The vector of a row.
-#[inline(always)]
-fn dir_of(vectors: &[OfRows; 3], j: usize) -> DVec3 {
-    DVec3::new(vectors[0][j], vectors[1][j], vectors[2][j])
-}
-
-#[inline(always)]
-fn load<S: Simd>(_: S, of_rows: &OfRows, group: usize) -> S::f64s {
-    S::as_simd_f64s(of_rows).0[group]
-}
-
-#[inline(always)]
-fn load_vector<S: Simd>(simd: S, vectors: &[OfRows; 3], group: usize) -> [S::f64s; 3] {
-    vectors.each_ref().map(|of_rows| load(simd, of_rows, group))
-}
-
-#[inline(always)]
-fn store<S: Simd>(_: S, of_rows: &mut OfRows, group: usize, values: S::f64s) {
-    S::as_mut_simd_f64s(of_rows).0[group] = values;
-}
-
-/// The products of vectors, summed as those of one are.
-#[inline(always)]
-fn dot<S: Simd>(simd: S, [ax, ay, az]: [S::f64s; 3], [bx, by, bz]: [S::f64s; 3]) -> S::f64s {
-    let of_two = simd.add_f64s(simd.mul_f64s(ax, bx), simd.mul_f64s(ay, by));
-    simd.add_f64s(of_two, simd.mul_f64s(az, bz))
 }

@@ -18,6 +18,7 @@
 mod abreast;
 mod climb;
 mod cone;
+mod held;
 mod seeds;
 mod sets;
 #[cfg(test)]
@@ -26,7 +27,7 @@ mod tests;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use super::shear::Shear;
+use super::shear::Across;
 use crate::geometry::numeric::{UNIT_ROUNDOFF, gamma};
 use crate::geometry::predicates::side_of_edge;
 use crate::geometry::{ConvexMesh, Interval, Line};
@@ -252,7 +253,7 @@ impl Walker {
     /// A vertex across the line, mm.
     #[inline(always)]
     fn place(&self, view: &LineView, vertex: u32) -> [f64; 2] {
-        view.shear.across(self.vertices[vertex as usize])
+        view.across.place(self.vertices[vertex as usize])
     }
 
     /// Where the line crosses the face, in the direction's unit.
@@ -286,7 +287,7 @@ impl Walker {
 /// A line as the walk sees it.
 #[derive(Clone, Copy, Default)]
 struct LineView {
-    shear: Shear,
+    across: Across,
     origin: DVec3,
     dir: DVec3,
     /// Vertices across the line err by less, mm.
@@ -300,15 +301,15 @@ struct LineView {
 impl LineView {
     #[inline(always)]
     fn new(walker: &Walker, origin: DVec3, dir: DVec3) -> Self {
-        let shear = Shear::of(origin, dir);
-        let [x, y] = shear.across(walker.centre);
+        let across = Across::of(origin, dir);
+        let [x, y] = across.place(walker.centre);
         // |across| of any vertex: that of the centre, and 2 · reach, as the slopes are at most 1.
         let largest = x.abs().max(y.abs()) + 2.0 * walker.reach;
         // Each coordinate across errs by γ₄ of twice the farthest vertex's.
         let rounding_mm = gamma(8) * ((origin - walker.centre).abs().max_element() + walker.reach);
         let a = dir.abs();
         Self {
-            shear,
+            across,
             origin,
             dir,
             rounding_mm,

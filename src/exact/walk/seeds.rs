@@ -12,8 +12,7 @@
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use super::abreast::ABREAST;
-use super::cone::OfRows;
+use super::abreast::{ABREAST, OfRays};
 use super::{Face, LineView, Seeds, Walker};
 use crate::exact::round;
 use crate::geometry::numeric::{gamma, greater, lesser};
@@ -142,12 +141,46 @@ impl SeedTable {
         Some(Seeds { entry: crossing(-1.0), exit: crossing(1.0) })
     }
 
-    /// As [`near`](Self::near), for many lines, as many at a time as the machine's instructions take. Lines that surely miss have
-    /// no seeds.
-    #[inline]
+    /// As [`near`](Self::near), for many lines, as many at a time as the instructions that the caller has. Lines that surely miss
+    /// have no seeds.
+    #[inline(always)]
     pub fn near_all(&self, rays: &[Segment], found: &mut [Option<Seeds>; ABREAST]) {
         found.fill(None);
-        crate::dispatch::arch().dispatch(NearAll { table: self, rays, found });
+        const NONE: OfRays = [0.0; ABREAST];
+        let (mut origins, mut dirs) = ([NONE; 3], [NONE; 3]);
+        for (i, ray) in rays.iter().take(ABREAST).enumerate() {
+            let (o, d) = (ray.line().origin(), ray.line().dir());
+            (origins[0][i], origins[1][i], origins[2][i]) = (o.x, o.y, o.z);
+            (dirs[0][i], dirs[1][i], dirs[2][i]) = (d.x, d.y, d.z);
+        }
+        let (mut over, mut cells) = (NONE, [NONE; 2]);
+        let last = self.side as f64 - 1.0;
+        for i in 0..ABREAST {
+            let o = self.to_ball * (DVec3::new(origins[0][i], origins[1][i], origins[2][i]) - self.middle);
+            let d = self.to_ball * DVec3::new(dirs[0][i], dirs[1][i], dirs[2][i]);
+            let inverse = 1.0 / d.length_squared();
+            let foot = o - (o.dot(d) * inverse) * d;
+            let offset_squared = foot.length_squared();
+            over[i] = offset_squared - (self.holding_squared + PASSING_BY * o.length_squared());
+            let half = (greater(1.0 - offset_squared, self.inset * self.inset) * inverse).sqrt();
+            for (cells, sign) in cells.iter_mut().zip([-half, half]) {
+                let [x, y] = flattened(foot + sign * d);
+                let cell = |place: f64| lesser(greater(floor(place * (last + 1.0)), 0.0), last);
+                cells[i] = round::WHOLE + (cell(y) * (last + 1.0) + cell(x));
+            }
+        }
+        for (i, ray) in rays.iter().take(ABREAST).enumerate() {
+            let seed = |cells: &OfRays| self.cells[round::whole(cells[i]) as usize];
+            let (entry, exit) = (seed(&cells[0]), seed(&cells[1]));
+            if over[i] > 0.0 {
+                continue;
+            }
+            found[i] = if entry.is_near_ball() && exit.is_near_ball() {
+                Some(Seeds { entry: entry.face, exit: exit.face })
+            } else {
+                self.near(ray.line().origin(), ray.line().dir())
+            };
+        }
     }
 
     /// Whether the line from `o` along `d`, mm, passes the ball by that holds the body, and so misses, surely.
@@ -158,7 +191,7 @@ impl SeedTable {
 
     /// The same of lines from one point, of all rows: those that surely miss have positive numbers.
     #[inline(always)]
-    pub fn beyond(&self, o: DVec3, dirs: &[OfRows; 3], beyond: &mut OfRows) {
+    pub fn beyond(&self, o: DVec3, dirs: &[OfRays; 3], beyond: &mut OfRays) {
         let o = self.to_ball * (o - self.middle);
         for (i, beyond) in beyond.iter_mut().enumerate() {
             *beyond = self.beyond_ball(o, DVec3::new(dirs[0][i], dirs[1][i], dirs[2][i]));
@@ -191,60 +224,6 @@ impl SeedTable {
         let size = self.side as f64;
         let (x, y) = (((x * size) as usize).min(self.side - 1), ((y * size) as usize).min(self.side - 1));
         self.cells[y * self.side + x]
-    }
-}
-
-/// A look for the seeds of many lines.
-struct NearAll<'t> {
-    table: &'t SeedTable,
-    rays: &'t [Segment],
-    found: &'t mut [Option<Seeds>; ABREAST],
-}
-
-/// A number of each line.
-type OfLines = [f64; ABREAST];
-
-impl pulp::WithSimd for NearAll<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        const NONE: OfLines = [0.0; ABREAST];
-        let Self { table, rays, found } = self;
-        let (mut origins, mut dirs) = ([NONE; 3], [NONE; 3]);
-        for (i, ray) in rays.iter().take(ABREAST).enumerate() {
-            let (o, d) = (ray.line().origin(), ray.line().dir());
-            (origins[0][i], origins[1][i], origins[2][i]) = (o.x, o.y, o.z);
-            (dirs[0][i], dirs[1][i], dirs[2][i]) = (d.x, d.y, d.z);
-        }
-        let (mut over, mut cells) = (NONE, [NONE; 2]);
-        let last = table.side as f64 - 1.0;
-        for i in 0..ABREAST {
-            let o = table.to_ball * (DVec3::new(origins[0][i], origins[1][i], origins[2][i]) - table.middle);
-            let d = table.to_ball * DVec3::new(dirs[0][i], dirs[1][i], dirs[2][i]);
-            let inverse = 1.0 / d.length_squared();
-            let foot = o - (o.dot(d) * inverse) * d;
-            let offset_squared = foot.length_squared();
-            over[i] = offset_squared - (table.holding_squared + PASSING_BY * o.length_squared());
-            let half = (greater(1.0 - offset_squared, table.inset * table.inset) * inverse).sqrt();
-            for (cells, sign) in cells.iter_mut().zip([-half, half]) {
-                let [x, y] = flattened(foot + sign * d);
-                let cell = |place: f64| lesser(greater(floor(place * (last + 1.0)), 0.0), last);
-                cells[i] = round::WHOLE + (cell(y) * (last + 1.0) + cell(x));
-            }
-        }
-        for (i, ray) in rays.iter().take(ABREAST).enumerate() {
-            let seed = |cells: &OfLines| table.cells[round::whole(cells[i]) as usize];
-            let (entry, exit) = (seed(&cells[0]), seed(&cells[1]));
-            if over[i] > 0.0 {
-                continue;
-            }
-            found[i] = if entry.is_near_ball() && exit.is_near_ball() {
-                Some(Seeds { entry: entry.face, exit: exit.face })
-            } else {
-                table.near(ray.line().origin(), ray.line().dir())
-            };
-        }
     }
 }
 

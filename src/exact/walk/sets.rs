@@ -18,6 +18,9 @@ const MANY_FACES: usize = 80_000;
 /// Faces for each pixel of the body's rectangle from which on walks begin by the table.
 const SPARSE_FACES: u64 = 2;
 
+/// Fewer rows are walked sooner one by one than abreast.
+const WORTH_IT: usize = 8;
+
 impl Walker {
     /// Records the crossings of each ray of `region`, numbered row by row, in any order; rays in doubt go to `other`.
     pub fn trace_grid<R: Record>(
@@ -32,11 +35,44 @@ impl Walker {
         let pixels = pixels_around(&Bounds::of([low, high]), grid);
         let is_sparse = self.faces.len() as u64 > SPARSE_FACES * pixels;
         match grid.upstream() {
+            _ if region.rows.len() < WORTH_IT => self.trace_rows(grid, region, record, other),
             Upstream::Source(source) if !is_sparse => {
                 let rays = ConeRays { walker: self, grid, source, region, record, other };
                 crate::dispatch::arch().dispatch(rays);
             }
             _ => self.trace_rows_abreast(grid, region, record, other, is_sparse),
+        }
+    }
+
+    /// Walks over one row after the other.
+    fn trace_rows<R: Record>(
+        &self,
+        grid: &RayGrid,
+        region: &Region,
+        record: &mut R,
+        mut other: impl FnMut(usize, &Segment, &mut R),
+    ) {
+        let (mut seeds, mut has_missed) = (None, true);
+        for (ray, (column, row)) in region.places().enumerate() {
+            if column == region.columns.start {
+                (seeds, has_missed) = (None, true);
+            }
+            let target = grid.point(column, row);
+            let origin = grid.start_of(target);
+            let dir = target - origin;
+            // Where one ray misses, the next may pass by far enough to say so at once.
+            if has_missed && self.seeds.passes_by(origin, dir) {
+                continue;
+            }
+            let Some(mut near) = seeds.or_else(|| self.seeds.near(origin, dir)) else { continue };
+            let answer = self.pass_from(origin, dir, &mut near);
+            (seeds, has_missed) = (Some(near), answer == Ok(None));
+            match answer {
+                // The direction reaches from the source to the target: the segment is 0 to 1.
+                Ok(Some(pass)) => note(record, ray, &pass, UNIT, dir.length()),
+                Ok(None) => {}
+                Err(Unsure) => other(ray, &grid.segment(column, row), record),
+            }
         }
     }
 
@@ -91,25 +127,9 @@ impl Walker {
         first: usize,
         rays: &[Segment],
         record: &mut R,
-        mut other: impl FnMut(usize, &Segment, &mut R),
+        other: impl FnMut(usize, &Segment, &mut R),
     ) {
-        let (mut ranks, mut near) = (Ranks::default(), [None; ABREAST]);
-        for (i, rays) in rays.chunks(ABREAST).enumerate() {
-            self.seeds.near_all(rays, &mut near);
-            self.touch(&near[..rays.len()]);
-            let of_ray = |(ray, near): (&Segment, &Option<Seeds>)| {
-                near.map(|seeds| (ray.line().origin(), ray.line().dir(), seeds))
-            };
-            ranks.walk(self, rays.iter().zip(&near).map(of_ray));
-            for (j, ray) in rays.iter().enumerate().filter(|(j, _)| near[*j].is_some()) {
-                let number = first + i * ABREAST + j;
-                match ranks.pass(self, j).0 {
-                    Ok(Some(pass)) => note(record, number, &pass, ray.reach(), 1.0),
-                    Ok(None) => {}
-                    Err(Unsure) => other(number, ray, record),
-                }
-            }
-        }
+        crate::dispatch::arch().dispatch(Batch { walker: self, first, rays, record, other });
     }
 
     /// Reads what the walks will begin with: many reads that do not wait for each other, where each walk would wait for its
@@ -135,6 +155,41 @@ impl Walker {
         if self.faces.len() >= MANY_FACES {
             let faces = half_edges.iter().map(|half_edge| &self.faces[*half_edge as usize / 4]);
             black_box(faces.fold(0, |sum: u32, face| sum.wrapping_add(face.corners[0])));
+        }
+    }
+}
+
+/// Rays in any order.
+struct Batch<'t, R, F> {
+    walker: &'t Walker,
+    first: usize,
+    rays: &'t [Segment],
+    record: &'t mut R,
+    other: F,
+}
+
+impl<R: Record, F: FnMut(usize, &Segment, &mut R)> pulp::WithSimd for Batch<'_, R, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { walker, first, rays, record, mut other } = self;
+        let (mut ranks, mut near) = (Ranks::default(), [None; ABREAST]);
+        for (i, rays) in rays.chunks(ABREAST).enumerate() {
+            walker.seeds.near_all(rays, &mut near);
+            walker.touch(&near[..rays.len()]);
+            let of_ray = |(ray, near): (&Segment, &Option<Seeds>)| {
+                near.map(|seeds| (ray.line().origin(), ray.line().dir(), seeds))
+            };
+            ranks.walk(walker, rays.iter().zip(&near).map(of_ray));
+            for (j, ray) in rays.iter().enumerate().filter(|(j, _)| near[*j].is_some()) {
+                let number = first + i * ABREAST + j;
+                match ranks.pass(walker, j).0 {
+                    Ok(Some(pass)) => note(record, number, &pass, ray.reach(), 1.0),
+                    Ok(None) => {}
+                    Err(Unsure) => other(number, ray, record),
+                }
+            }
         }
     }
 }

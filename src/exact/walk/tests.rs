@@ -189,20 +189,24 @@ fn faces_held_for_many_rays_give_the_bits_of_walks() {
         let bounds = body.bounds();
         let (centre, size) = (bounds.centre(), bounds.diagonal());
         let steps = [DVec3::new(0.011, 0.0013, 0.0), DVec3::new(0.0, 0.0007, 0.0083)].map(|step| size * step);
-        let source = centre - size * DVec3::new(0.3, 4.0, 0.2);
         let origin = centre + size * DVec3::new(0.2, 3.0, 0.1) - 60.0 * (steps[0] + steps[1]);
-        let grid = RayGrid::new(Upstream::Source(source), origin, steps, [120; 2]).expect("a grid");
-        let trace = |region: &Region| {
+        let trace = |grid: &RayGrid, region: &Region| {
             let mut lengths = vec![0.0; region.pixels()];
             let doubt = |ray: usize, _: &Segment, r: &mut Lengths| r.crossing(ray, 0.125, 0, Way::Out);
-            walker.trace_grid(&grid, region, &mut Lengths(&mut lengths), doubt);
+            walker.trace_grid(grid, region, &mut Lengths(&mut lengths), doubt);
             lengths
         };
-        // On their own, rays find no face held.
-        let alone = |(column, row)| trace(&Region { columns: column..column + 1, rows: row..row + 1 })[0];
-        let expected: Vec<f64> = grid.whole().places().map(alone).collect();
-        assert!(expected.iter().any(|&length| length > 0.0), "{name}");
-        assert_eq!(trace(&grid.whole()), expected, "{name}");
+        // Far off, and within the body or about there.
+        for (away, is_far) in [(DVec3::new(0.3, 4.0, 0.2), true), (DVec3::new(0.001, 0.002, 0.0), false)] {
+            let source = Upstream::Source(centre - size * away);
+            let grid = RayGrid::new(source, origin, steps, [120; 2]).expect("a grid");
+            // On their own, rays find no face held.
+            let alone =
+                |(column, row)| trace(&grid, &Region { columns: column..column + 1, rows: row..row + 1 })[0];
+            let expected: Vec<f64> = grid.whole().places().map(alone).collect();
+            assert!(!is_far || expected.iter().any(|&length| length > 0.0), "{name}");
+            assert_eq!(trace(&grid, &grid.whole()), expected, "{name}");
+        }
     }
 }
 
