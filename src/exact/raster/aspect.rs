@@ -106,6 +106,10 @@ impl Aspect {
             self.part_small(patch.corners.len());
         }
         self.near_count = 0;
+        // Where all are small there are none to list.
+        if PART_SMALL && !self.is_near.iter().fold(false, |any, is_near| any | is_near) {
+            return;
+        }
         for face in 0..patch.corners.len() {
             self.near[self.near_count] = face as u8;
             self.near_count += usize::from(self.is_near[face]);

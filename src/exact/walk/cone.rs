@@ -14,7 +14,7 @@ use glam::DVec3;
 use pulp::Simd;
 
 use super::abreast::{ABREAST, OfRays};
-use super::held::{Footing, HeldFaces, NONE, dir_of, dot, load, set, store};
+use super::held::{Footing, HeldFaces, NONE, dir_of, dot, load, set, store, store_vector};
 use super::sets::{UNIT, note};
 use super::{Pass, Seeds, Unsure, Walker};
 use crate::exact::Record;
@@ -151,9 +151,7 @@ impl<'w> Rows<'w> {
             let sum = simd.add_f64s(simd.abs_f64s(dir[0]), simd.abs_f64s(dir[1]));
             store(simd, &mut self.sizes, group, simd.add_f64s(sum, simd.abs_f64s(dir[2])));
             store(simd, &mut self.lengths, group, simd.sqrt_f64s(dot(simd, dir, dir)));
-            for axis in 0..3 {
-                store(simd, &mut self.dirs[axis], group, dir[axis]);
-            }
+            store_vector(simd, &mut self.dirs, group, dir);
         }
         self.pass_by();
     }
@@ -186,10 +184,10 @@ impl<'w> Rows<'w> {
             held.look(simd, groups, dirs, sizes, *sure);
             let mut walking = [0; ABREAST];
             let mut left = 0;
-            for j in 0..*count {
+            for (j, (margin, passes_by)) in held.margins.iter().zip(&*passes_by).take(*count).enumerate() {
                 // Branches would not be foreseen.
                 walking[left] = j as u8;
-                left += usize::from((held.margins[j] <= 0.0) & !passes_by[j]);
+                left += usize::from((*margin <= 0.0) & !passes_by);
             }
             for &j in &walking[..left] {
                 let j = j as usize % ABREAST;

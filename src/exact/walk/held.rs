@@ -52,9 +52,7 @@ impl HeldFaces {
             let least = simd.min_f64s(simd.min_f64s(products[0], products[1]), products[2]);
             let doubt = simd.mul_f64s(simd.splat_f64s(sure), load(simd, sizes, group));
             store(simd, &mut self.margins, group, simd.sub_f64s(least, doubt));
-            for edge in 0..3 {
-                store(simd, &mut self.products[edge], group, products[edge]);
-            }
+            store_vector(simd, &mut self.products, group, products);
         }
     }
 
@@ -103,8 +101,8 @@ impl HeldFaces {
     pub fn stand_on(&mut self, walker: &Walker, source: DVec3, j: usize, at: &Footing) {
         let Face { corners, normal, .. } = walker.faces[at.half_edge as usize / 4];
         self.half_edges[j] = at.half_edge;
-        for edge in 0..3 {
-            set(&mut self.sides[edge], j, at.sides[edge]);
+        for (of_side, side) in self.sides.iter_mut().zip(at.sides) {
+            set(of_side, j, side);
         }
         set(&mut self.normals, j, normal);
         self.heights[j] = normal.dot(walker.vertices[corners[0] as usize] - source);
@@ -184,6 +182,18 @@ fn load_vector<S: Simd>(simd: S, [x, y, z]: &[OfRays; 3], group: usize) -> [S::f
 #[inline(always)]
 pub(super) fn store<S: Simd>(_: S, of_rows: &mut OfRays, group: usize, values: S::f64s) {
     S::as_mut_simd_f64s(of_rows).0[group] = values;
+}
+
+#[inline(always)]
+pub(super) fn store_vector<S: Simd>(
+    simd: S,
+    vectors: &mut [OfRays; 3],
+    group: usize,
+    [x, y, z]: [S::f64s; 3],
+) {
+    store(simd, &mut vectors[0], group, x);
+    store(simd, &mut vectors[1], group, y);
+    store(simd, &mut vectors[2], group, z);
 }
 
 /// The products of vectors, summed as those of one are.
