@@ -20,8 +20,14 @@ const BATCH: usize = 100_000;
 /// Engines that trace ray by ray trace about so many; as many in each part of the set.
 const ENOUGH: usize = 40_000;
 
-/// Parts of a set of rays that are traced or left out.
+/// Parts of a set of rays that are traced or left out, at most.
 const PARTS: u32 = 64;
+
+/// Rows of a part of an image, at least: the program's tiles have some, too.
+const PART_ROWS: u32 = 32;
+
+/// Fewer parts would not stand for all: there are more misses at the top of an image than in its middle.
+const FEWEST_PARTS: usize = 6;
 
 /// The engines' times for one body and one set of rays.
 pub struct Choice {
@@ -98,8 +104,12 @@ fn nanoseconds_per_ray(body: &Body, engine: Engine, rays: &RaySet, rounds: usize
 
 /// The raster is timed on all rays, as it makes ready for them all; others on a share of them.
 fn once(body: &Body, engine: Engine, rays: &RaySet) -> f64 {
-    let parts = if engine == Engine::Raster { vec![rays.whole()] } else { rays.parts(PARTS) };
-    let one_of = if engine == Engine::Raster { 1 } else { (rays.count() / ENOUGH).clamp(1, 16) };
+    let parts = match rays {
+        _ if engine == Engine::Raster => vec![rays.whole()],
+        RaySet::Grid(grid) => rays.parts(PARTS.min(grid.size().1 / PART_ROWS)),
+        RaySet::Batch(_) => rays.parts(PARTS),
+    };
+    let one_of = (rays.count() / ENOUGH).clamp(1, (parts.len() / FEWEST_PARTS).max(1));
     let parts = || parts.iter().step_by(one_of);
     let count: usize = parts().map(|part| part.pixels()).sum();
     // Written once before, so that no page is new.

@@ -35,7 +35,7 @@ impl Walker {
         let pixels = pixels_around(&Bounds::of([low, high]), grid);
         let is_sparse = self.faces.len() as u64 > SPARSE_FACES * pixels;
         match grid.upstream() {
-            _ if region.rows.len() < WORTH_IT => self.trace_rows(grid, region, record, other),
+            _ if region.rows.len() < WORTH_IT => self.trace_rows(grid, region, record, other, is_sparse),
             Upstream::Source(source) if !is_sparse => {
                 let rays = ConeRays { walker: self, grid, source, region, record, other };
                 crate::dispatch::arch().dispatch(rays);
@@ -51,6 +51,7 @@ impl Walker {
         region: &Region,
         record: &mut R,
         mut other: impl FnMut(usize, &Segment, &mut R),
+        is_sparse: bool,
     ) {
         let (mut seeds, mut has_missed) = (None, true);
         for (ray, (column, row)) in region.places().enumerate() {
@@ -64,7 +65,8 @@ impl Walker {
             if has_missed && self.seeds.passes_by(origin, dir) {
                 continue;
             }
-            let Some(mut near) = seeds.or_else(|| self.seeds.near(origin, dir)) else { continue };
+            let last = seeds.filter(|_| !is_sparse);
+            let Some(mut near) = last.or_else(|| self.seeds.near(origin, dir)) else { continue };
             let answer = self.pass_from(origin, dir, &mut near);
             (seeds, has_missed) = (Some(near), answer == Ok(None));
             match answer {
