@@ -57,9 +57,9 @@ mod cost {
     /// To grow what the first view asks.
     pub const GROWTH: f64 = 2.1e6;
     /// To make the body ready for a view.
-    pub const VIEW: f64 = 0.5e6;
+    pub const VIEW: f64 = 0.8e6;
     /// To evaluate leaves, for each pixel of the body's rectangle.
-    pub const PIXEL: f64 = 2.0;
+    pub const PIXEL: f64 = 1.7;
 }
 
 /// Of the pixels of its rectangle, a round body meets so many.
