@@ -115,8 +115,8 @@ fn tree_ns(body: &Body, image: &ImageCost, tolerance_mm: f64, views: f64) -> f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::ClosedMesh;
     use crate::geometry::primitives::icosphere;
+    use crate::geometry::{ClosedMesh, Upstream};
     use crate::scene::Scene;
 
     #[test]
@@ -139,5 +139,21 @@ mod tests {
         assert!(!prefers(&few, 0.5, 64), "so are these");
         let none = Estimate::of(&many, &TreeSettings::default(), Demand::default());
         assert!(!none.prefers_tree(), "nothing is asked");
+    }
+
+    #[test]
+    fn tables_are_made_only_for_views_enough_to_pay_for_them() {
+        let mesh = icosphere(6).map_vertices(|v| 80.0 * v);
+        let body = Body::new(ClosedMesh::new(mesh).expect("closed").0);
+        let steps = [4.0 * glam::DVec3::X, 4.0 * glam::DVec3::Y];
+        let source = Upstream::Source(glam::DVec3::new(0.0, 0.0, -1000.0));
+        let corner = glam::DVec3::new(-128.0, -128.0, 500.0);
+        let grid = RayGrid::new(source, corner, steps, [64, 64]).expect("rays");
+        let engine = |views: u64| {
+            let demand = Demand { views, pixels: 64 * 64 * views, grid: Some(grid) };
+            Estimate::of(&body, &TreeSettings::default(), demand).engine
+        };
+        assert_eq!((engine(1), engine(1000)), (Engine::Raster, Engine::Walk));
+        assert_eq!(body.engine_for_image(&grid), engine(1000), "who does not know takes them to be there");
     }
 }
