@@ -25,6 +25,8 @@ pub(super) const FEW_PLANES: usize = 100;
 /// Costs of one thread, in nanoseconds, by which engines are chosen for an image: measured (`cargo bench --bench table -- choice`
 /// in `benches`), on bodies of eighty to a third of a million faces. Only their ratios matter.
 mod cost {
+    use super::Engine;
+
     /// To look at a face.
     const RASTER_FACE: f64 = 11.0;
     /// To find what it covers, by as many rows as a square of its pixels has.
@@ -54,19 +56,32 @@ mod cost {
     pub fn bvh(faces: f64, pixels: f64) -> f64 {
         (190.0 + 18.0 * faces.sqrt().sqrt()) * pixels
     }
+
+    /// To make ready, for each face, what the engine needs of a body: patches, the walker's tables, the hierarchy.
+    pub fn ready(engine: Engine, faces: f64) -> f64 {
+        let of_face = match engine {
+            Engine::Clip => 0.0,
+            Engine::Raster => 45.0,
+            Engine::Walk => 260.0,
+            Engine::Bvh => 350.0,
+        };
+        of_face * faces
+    }
 }
 
-/// What an image of a body is estimated to cost, nanoseconds of one thread. Only ratios matter.
+/// What images of a body are estimated to cost, nanoseconds of one thread. Only ratios matter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageCost {
     /// The quickest engine.
     pub engine: Engine,
-    /// All of the image by that engine.
+    /// All of the images by that engine, and what it makes ready.
     pub ns: f64,
     /// Pixels of the rectangle that the body is seen in.
     pub pixels: f64,
     /// One of them by a walk along its row.
     pub walked_pixel_ns: f64,
+    /// To make the walker's tables.
+    pub walker_ns: f64,
 }
 
 impl Engine {
@@ -90,24 +105,29 @@ impl Engine {
 }
 
 impl Body {
-    /// The quickest engine for an image: the raster, unless the body is seen in few pixels for the number of its faces.
+    /// The quickest engine for an image once each has made ready what it needs: the raster, unless the body is seen in few pixels
+    /// for the number of its faces.
     pub fn engine_for_image(&self, grid: &RayGrid) -> Engine {
-        self.image_cost(grid).engine
+        self.image_cost(grid, f64::INFINITY).engine
     }
 
-    /// What an image is estimated to cost by that engine.
-    pub fn image_cost(&self, grid: &RayGrid) -> ImageCost {
+    /// What so many images like one are estimated to cost by the quickest engine, with what it makes ready for them.
+    pub fn image_cost(&self, grid: &RayGrid, images: f64) -> ImageCost {
         let pixels = raster::pixels_around(&self.bounds(), grid) as f64;
         let faces = self.surface().mesh().faces.len() as f64;
         let walk = cost::walk(faces, pixels);
-        let (other, cost) = match (self.convexity(), grid.upstream()) {
+        let other = match (self.convexity(), grid.upstream()) {
             (Ok(_), Upstream::Source(_)) => (Engine::Walk, cost::walk_of_cone(faces, pixels)),
             (Ok(_), Upstream::Path(_)) => (Engine::Walk, walk),
             (Err(_), _) => (Engine::Bvh, cost::bvh(faces, pixels)),
         };
-        let raster = cost::raster(faces, pixels);
-        let (engine, ns) = if cost < raster { (other, cost) } else { (Engine::Raster, raster) };
-        ImageCost { engine, ns, pixels, walked_pixel_ns: walk / pixels.max(1.0) }
+        // For each image, so that there may be any number of them.
+        let with_ready = |(engine, ns): (Engine, f64)| (engine, ns + cost::ready(engine, faces) / images);
+        let raster = with_ready((Engine::Raster, cost::raster(faces, pixels)));
+        let other = with_ready(other);
+        let (engine, ns) = if other.1 < raster.1 { other } else { raster };
+        let walker_ns = cost::ready(Engine::Walk, faces);
+        ImageCost { engine, ns: ns * images, pixels, walked_pixel_ns: walk / pixels.max(1.0), walker_ns }
     }
 
     /// The quickest engine for rays in no order.

@@ -1,4 +1,20 @@
 //! What becomes of a cell: a pure function of it.
+//!
+//! **Why values, and so many.** An exact chord also knows the gradient of F, by normals that turn over smooth edges: five equations
+//! a line. By 24 lines with gradients in place of 64 without, and the same 24 tests, an image of 600² (an ellipsoid, tolerance
+//! 0.5 mm) takes half the samples, and is no better off: what a cubic leaves out has larger gradients than values.
+//!
+//! | | 20 480 faces | 327 680 faces |
+//! |---|--:|--:|
+//! | samples, by values / with gradients | 6 192 / 4 848 | 6 192 / 3 036 |
+//! | leaves | 50 / 67 | 50 / 50 |
+//! | lines traced, % | 2.1 / 4.8 | 0.07 / 1.6 |
+//! | mean error, mm | 0.0106 / 0.0130 | 0.0008 / 0.0034 |
+//! | growth, ms | 3.7 / 5.8 | 4.2 / 5.2 |
+//!
+//! With 40 lines the error is still three times that by values on the finer one. Nor is much to be had from samples that neighbours
+//! share: a view's cells meet others of its across 3.0 to 3.6 of their 8 sides, so that even if all lines to fit lay on sides, a
+//! seventh of all samples would be spared, and walks for samples are a quarter of the time.
 
 use super::cubic::{Cubic, Design, FIT_LINES, TEST_LINES};
 use super::planes::{FewPlanes, MOST_PLANES};

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::attributes::chord::ChordLength;
 use crate::attributes::squared_chord::{Asked, ImageChords, ImageLengths, Known, SquaredChord};
-use crate::exact::{Body, Spans};
+use crate::exact::{Body, Engine, Spans};
 use crate::geometry::{Interval, RayGrid, Region, Segment};
 use crate::linespace::LineSpace;
 use crate::modes::project::Found;
@@ -135,6 +135,12 @@ impl<'a> Forest<'a> {
     /// What an organ is estimated to take, if that decides how it is found.
     pub fn estimate(&self, organ: usize) -> Option<Estimate> {
         self.estimates[organ]
+    }
+
+    /// The exact engine that is estimated to be the quickest for all views of an organ, if it is known what they are.
+    pub fn engine_for_views(&self, organ: usize) -> Option<Engine> {
+        self.settings.demand?.grid?;
+        self.estimates[organ].map(|estimate| estimate.engine)
     }
 
     fn new_tree(&self, organ: usize) -> Option<OrganTree<'a>> {

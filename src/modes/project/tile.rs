@@ -74,7 +74,8 @@ impl<'a, 's> TileTracer<'a, 's> {
         let grows = |organ: usize| projector.forest.as_ref().is_some_and(|forest| forest.grows(organ));
         let ready = |(organ, it): (usize, &'a Organ)| {
             let is_needed = projector.traced.binary_search(&organ).is_ok() && !grows(organ);
-            is_needed.then(|| it.body.view(view.rays(), projector.engine))
+            let estimated = || projector.forest.as_ref()?.engine_for_views(organ);
+            is_needed.then(|| it.body.view(view.rays(), projector.engine.or_else(estimated)))
         };
         let bodies = organs.par_iter().enumerate().map(ready).collect();
         let in_runs = |organ: usize| {
