@@ -13,10 +13,10 @@
 //! answers are the same whichever thread asks first.
 
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::{DVec2, DVec3};
 
+use super::lazy::Lazy;
 use crate::geometry::{Ray, Real, Vec3};
 use crate::surface::{Reach, Surface};
 
@@ -59,24 +59,15 @@ struct Lattice {
 /// What is known of the lattice's rays and cells.
 struct Table {
     /// Inverse depths at the (SIDE + 1)² corners, row by row, and at the SIDE² middles; 0 for a miss.
-    corners: Vec<Sample>,
-    middles: Vec<Sample>,
+    corners: Vec<Lazy>,
+    middles: Vec<Lazy>,
     /// Cells that no part of the surface covers are never met.
     may_be_met: Vec<bool>,
 }
 
-/// An inverse depth; not a number until the ray is traced.
-struct Sample(AtomicU64);
-
-impl Default for Sample {
-    fn default() -> Self {
-        Self(AtomicU64::new(f64::NAN.to_bits()))
-    }
-}
-
 impl<'a> LightMap<'a> {
     /// Bytes that a map holds once it is used.
-    pub const BYTES: usize = ((SIDE + 1) * (SIDE + 1) + SIDE * SIDE) * size_of::<Sample>() + SIDE * SIDE;
+    pub const BYTES: usize = ((SIDE + 1) * (SIDE + 1) + SIDE * SIDE) * size_of::<Lazy>() + SIDE * SIDE;
 
     /// The map of a surface before a light. The object's own places are off by `threshold` box units at most.
     pub fn new(surface: &'a Surface, light: DVec3, threshold: f64) -> Self {
@@ -157,11 +148,11 @@ impl Lattice {
         let corner = |bits: usize| {
             let (column, row) = (cell[0] + (bits & 1), cell[1] + (bits >> 1));
             let sample = &table.corners[row * (SIDE + 1) + column];
-            R::of(sample.known(|| self.sample::<R>(map, [column as f64, row as f64])))
+            R::of(sample.get(|| self.sample::<R>(map, [column as f64, row as f64])))
         };
         let corners: [R; 4] = std::array::from_fn(corner);
         let middle = table.middles[cell[1] * SIDE + cell[0]]
-            .known(|| self.sample::<R>(map, cell.map(|x| x as f64 + 0.5)));
+            .get(|| self.sample::<R>(map, cell.map(|x| x as f64 + 0.5)));
         // d(1/z) = −dz/z²: a length along the axis.
         let as_length = depth * depth;
         let before = |met: R| match met.get() {
@@ -199,7 +190,6 @@ impl Lattice {
 
     /// Nothing is known, but for the cells that no box around a part of the surface covers.
     fn table(&self, map: &LightMap) -> Table {
-        let samples = |n: usize| (0..n).map(|_| Sample::default()).collect();
         let mut may_be_met = vec![false; SIDE * SIDE];
         for part in map.surface.parts() {
             let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
@@ -218,7 +208,7 @@ impl Lattice {
                 may_be_met[row * SIDE + low.x as usize..=row * SIDE + high.x as usize].fill(true);
             }
         }
-        Table { corners: samples((SIDE + 1) * (SIDE + 1)), middles: samples(SIDE * SIDE), may_be_met }
+        Table { corners: Lazy::many((SIDE + 1) * (SIDE + 1)), middles: Lazy::many(SIDE * SIDE), may_be_met }
     }
 }
 
@@ -238,19 +228,6 @@ fn agreed(corners: [f64; 4], middle: f64, slack: f64) -> Option<bool> {
 fn slope(axis: DVec3, across: [DVec3; 2], way: DVec3) -> Option<DVec2> {
     let depth = way.dot(axis);
     (depth > 0.0).then(|| DVec2::new(way.dot(across[0]), way.dot(across[1])) / depth)
-}
-
-impl Sample {
-    /// What is known, made by `trace` if nothing is.
-    fn known(&self, trace: impl FnOnce() -> f64) -> f64 {
-        let known = f64::from_bits(self.0.load(Ordering::Relaxed));
-        if !known.is_nan() {
-            return known;
-        }
-        let traced = trace();
-        self.0.store(traced.to_bits(), Ordering::Relaxed);
-        traced
-    }
 }
 
 #[cfg(test)]

@@ -9,12 +9,17 @@
 //! Trees are asked for what is smooth, by rays from the camera on: the first hit of a line with its normal, and the ray that
 //! leaves a mirror or a glass body. What lights see of an object with a tree is interpolated, too. All of it is kept from view
 //! to view. Where trees do not answer, where a ray starts within an object's box, for objects without a tree and after a turn,
-//! rays are traced. Colours are floats to the end; a pixel depends on its rays alone, so pictures are the same bits for any
-//! number of threads.
+//! rays are traced. Flat mirrors are no exception: trees for what they show save an eighth of the operations of a picture full of
+//! it, but tear outlines. Both ways look for objects in a ray's direction only, and at a sky whose noise is made once. Colours
+//! are floats to the end; a pixel depends on its rays alone, so pictures are the same bits for any number of threads.
 
+mod around;
+mod cube;
+mod lazy;
 mod light_map;
 mod picture;
 mod seer;
+mod sky_map;
 #[cfg(test)]
 mod tests;
 
@@ -26,13 +31,15 @@ use rayon::prelude::*;
 use super::Control;
 use super::project::tiles;
 use crate::error::Result;
-use crate::geometry::{Ray, Real, Region, Vec3};
+use crate::geometry::{Bounds, Ray, Real, Region, Vec3};
 use crate::ritree::{BuildCounts, Cache, Parameters};
 use crate::scene::trace::{Camera, World};
 use crate::surface::optics::{reflectance, reflected};
 use crate::surface::{Reach, Slabs};
+use around::Around;
 pub use picture::{Picture, Samples};
 use seer::{Asker, Seer, Sight};
+use sky_map::SkyMap;
 
 /// How trees of what rays meet are grown; the defaults are the paper's.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -90,7 +97,11 @@ impl std::ops::AddAssign for Work {
 /// [`Counted`](crate::geometry::Counted) counts what it takes.
 pub struct Renderer<'a, R: Real> {
     world: &'a World,
+    sky: SkyMap<'a>,
     seers: RwLock<Vec<Seer<'a, R>>>,
+    /// The boxes around the objects, and which of them lie where around each light.
+    boxes: Vec<Bounds>,
+    lights: Vec<Around>,
     cache: Cache,
     kept_share: f64,
     clock: AtomicU32,
@@ -104,9 +115,14 @@ impl<'a, R: Real> Renderer<'a, R> {
             Tracing::RiTree(settings) => (Some(settings.parameters), settings),
         };
         let seers = world.objects.iter().map(|object| Seer::new(object, world, parameters)).collect();
+        let boxes: Vec<Bounds> = world.objects.iter().map(|object| object.surface.bounds()).collect();
+        let lights = world.lights.iter().map(|light| Around::new(light.position, &boxes)).collect();
         Self {
             world,
+            sky: SkyMap::new(&world.sky),
             seers: RwLock::new(seers),
+            boxes,
+            lights,
             cache: Cache::new(settings.cache_bytes),
             kept_share: settings.kept_share,
             clock: AtomicU32::new(1),
@@ -124,11 +140,12 @@ impl<'a, R: Real> Renderer<'a, R> {
         samples: &Samples,
         control: &Control,
     ) -> Result<Picture> {
+        let view = View { camera, size, samples, around: Around::new(camera.eye(), &self.boxes) };
         let tiles: Vec<(Region, Tile)> = tiles(size)
             .into_par_iter()
             .map(|region| {
                 control.check()?;
-                let (mut tile, operations) = R::count(|| self.tile(camera, size, samples, &region));
+                let (mut tile, operations) = R::count(|| self.tile(&view, &region));
                 tile.work.operations = operations;
                 self.prune_if_full();
                 control.advance(region.pixels() as u64);
@@ -138,7 +155,8 @@ impl<'a, R: Real> Renderer<'a, R> {
         Ok(Picture::of_tiles(size, tiles))
     }
 
-    /// Bytes that the trees hold, and tables beside them: the cache's limit is that of the trees, tables do not grow.
+    /// Bytes that the trees hold, and tables beside them: the cache's limit is that of the trees, tables do not grow. The sky's
+    /// texture is not among them: tracing has it as well.
     pub fn tree_bytes(&self) -> usize {
         self.cache.used_bytes() + self.enter().iter().map(Seer::table_bytes).sum::<usize>()
     }
@@ -155,12 +173,15 @@ impl<'a, R: Real> Renderer<'a, R> {
         self.seers.read().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn tile(&self, camera: &Camera, size: (u32, u32), samples: &Samples, region: &Region) -> Tile {
+    fn tile(&self, view: &View, region: &Region) -> Tile {
         let seers = self.enter();
         let now = self.clock.fetch_add(1, Ordering::Relaxed);
         seers.iter().for_each(|seer| seer.tick_to(now));
         let mut light = LightPath {
             world: self.world,
+            sky: &self.sky,
+            eye: &view.around,
+            lights: &self.lights,
             seers: &seers,
             askers: seers.iter().map(Seer::asker).collect(),
             cache: &self.cache,
@@ -171,9 +192,9 @@ impl<'a, R: Real> Renderer<'a, R> {
         let mut tile = Tile::default();
         for (column, row) in region.places() {
             light.was_traced = false;
-            let places = samples.of_pixel(column, row);
+            let places = view.samples.of_pixel(column, row);
             let sum = places.iter().fold(Vec3::default(), |sum, [x, y]| {
-                let ray = camera.ray(size, f64::from(column) + x, f64::from(row) + y);
+                let ray = view.camera.ray(view.size, f64::from(column) + x, f64::from(row) + y);
                 sum + light.radiance(&ray, R::of(1.0), None, 0, true)
             });
             let mean = sum * R::of(1.0 / places.len() as f64);
@@ -195,6 +216,15 @@ impl<'a, R: Real> Renderer<'a, R> {
     }
 }
 
+/// What is rendered of a world.
+struct View<'a> {
+    camera: &'a Camera,
+    size: (u32, u32),
+    samples: &'a Samples,
+    /// Which objects lie where around the camera.
+    around: Around,
+}
+
 /// The pixels of one tile, row by row.
 #[derive(Default)]
 struct Tile {
@@ -206,6 +236,10 @@ struct Tile {
 /// Light on its way back to the camera, for the rays of one tile.
 struct LightPath<'t, 'a, R: Real> {
     world: &'t World,
+    sky: &'t SkyMap<'a>,
+    /// Which objects lie where around the camera, and around each light.
+    eye: &'t Around,
+    lights: &'t [Around],
     seers: &'t [Seer<'a, R>],
     askers: Vec<Asker<'t, 'a, R>>,
     cache: &'t Cache,
@@ -234,7 +268,7 @@ impl<R: Real> LightPath<'_, '_, R> {
     ) -> Vec3<R> {
         self.work.rays += 1;
         self.is_from_camera = is_straight;
-        let Some((object, sight)) = self.nearest(ray, left) else { return self.world.sky.seen(ray) };
+        let Some((object, sight)) = self.nearest(ray, left) else { return self.sky.seen(ray) };
         let seer = &self.seers[object];
         let material = seer.material();
         let mut light = self.shade(object, ray, &sight);
@@ -272,8 +306,16 @@ impl<R: Real> LightPath<'_, '_, R> {
     /// The nearest object along a ray.
     fn nearest(&mut self, ray: &Ray<R>, left: Option<usize>) -> Option<(usize, Sight<R>)> {
         let mut best: Option<(usize, Sight<R>)> = None;
+        let in_view = self.is_from_camera.then(|| self.eye.towards(ray.dir));
+        if in_view.is_some_and(<[u16]>::is_empty) {
+            return None;
+        }
         let slabs = Slabs::new(ray);
-        for index in (0..self.seers.len()).filter(|&i| Some(i) != left) {
+        for n in 0..in_view.map_or(self.seers.len(), <[u16]>::len) {
+            let index = in_view.map_or(n, |objects| objects[n].into());
+            if Some(index) == left {
+                continue;
+            }
             let to = best.as_ref().map_or(R::of(f64::INFINITY), |(_, sight)| sight.t);
             if let Some(sight) = self.sight(index, ray, &slabs, to) {
                 best = Some((index, sight));
@@ -339,9 +381,13 @@ impl<R: Real> LightPath<'_, '_, R> {
     /// The share of a light that reaches a place of an object through all others.
     fn visibility(&mut self, object: usize, light: usize, ray: &Ray<R>, far: R) -> R {
         self.work.rays += 1;
-        let slabs = Slabs::new(ray);
         let mut share = R::of(1.0);
-        for index in (0..self.seers.len()).filter(|&i| i != object) {
+        let on_the_way = self.lights[light].towards(-ray.dir);
+        if on_the_way.iter().all(|&index| usize::from(index) == object) {
+            return share;
+        }
+        let slabs = Slabs::new(ray);
+        for index in on_the_way.iter().map(|&index| usize::from(index)).filter(|&i| i != object) {
             let seer = &self.seers[index];
             let is_near = || slabs.entry(&seer.bounds, R::of(0.0), far).is_some();
             if share.get() > 0.0 && is_near() && seer.hides(light, ray, far) {

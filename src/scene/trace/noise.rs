@@ -2,7 +2,7 @@
 
 use crate::geometry::{Real, Vec3};
 
-/// Octaves of turbulence; the finest is 1/32 of the first wave.
+/// Octaves of turbulence; the finest is 1/16 of the first wave.
 const OCTAVES: i32 = 5;
 
 /// Perlin's gradient noise (2002, doi:10.1145/566654.566636) on a seeded lattice.
@@ -12,6 +12,9 @@ pub struct Noise {
 }
 
 impl Noise {
+    /// Cells of the finest octave's lattice along the first one's.
+    pub const FINEST: f64 = (1 << (OCTAVES - 1)) as f64;
+
     /// The noise of a seed.
     pub fn new(seed: u64) -> Self {
         Self { seed }

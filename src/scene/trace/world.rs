@@ -125,13 +125,21 @@ pub struct Sky {
 }
 
 impl Sky {
-    /// What a ray sees there.
-    pub fn seen<R: Real>(&self, ray: &Ray<R>) -> Vec3<R> {
+    /// Where a ray meets it, from its centre.
+    pub fn place<R: Real>(&self, ray: &Ray<R>) -> Vec3<R> {
         let off = ray.origin - Vec3::of(self.centre);
         let middle = off.dot(ray.dir);
         let under = middle * middle - off.dot(off) + R::of(self.radius * self.radius);
-        let place = off + ray.dir * (under.max(R::of(0.0)).sqrt() - middle);
-        let share = self.noise.turbulence(place * R::of(self.frequency / self.radius));
+        off + ray.dir * (under.max(R::of(0.0)).sqrt() - middle)
+    }
+
+    /// How far its noise is from the first colour to the second at a place on it, 0 to 1.
+    pub fn share<R: Real>(&self, place: Vec3<R>) -> R {
+        self.noise.turbulence(place * R::of(self.frequency / self.radius))
+    }
+
+    /// The colour of a share.
+    pub fn colour<R: Real>(&self, share: R) -> Vec3<R> {
         Vec3::of(self.colours[0]) + Vec3::of(self.colours[1] - self.colours[0]) * share
     }
 }
@@ -161,6 +169,11 @@ impl Camera {
             up: right.cross(forward),
             slope: (0.5 * width_deg).to_radians().tan(),
         })
+    }
+
+    /// Where it is.
+    pub fn eye(&self) -> DVec3 {
+        self.eye
     }
 
     /// The ray through (x, y) of a picture of `columns` × `rows`, pixels from its upper left corner.

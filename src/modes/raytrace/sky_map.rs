@@ -1,0 +1,124 @@
+//! What the sky's noise looks like from its middle, as a texture on the six sides of a cube.
+//!
+//! ```text
+//!    ┌──┬──┬──┬──┐        Five octaves of noise cost some three hundred operations, and a picture looks at the same places of
+//!    ├──┼──┼──┼──┤        the sky again and again. So the noise is evaluated at the points of a lattice, when they are asked
+//!    ├──┼─●┼──┼──┤  ◄──   for first, and mixed bilinearly between them: some fifteen operations. The lattice is twice as fine
+//!    ├──┼──┼──┼──┤        as that of the finest octave, whose tops are rounded: by a half of 1/255 in the mean. Sides
+//!    └──┴──┴──┴──┘        share the points on their edges, where the noise is that of the place and not of the side.
+//! ```
+
+use super::cube::OnCube;
+use super::lazy::Lazy;
+use crate::geometry::{Ray, Real, Vec3};
+use crate::scene::trace::{Noise, Sky};
+
+/// Cells of the texture along a cell of the noise's finest octave, where the sides are nearest to the sky and cells largest.
+const CELLS_PER_OCTAVE_CELL: f64 = 2.0;
+
+/// Cells along a side, at most: noise of more than 8 waves is evaluated for each ray. Textures so hold 13 MB at most.
+const MOST_CELLS: usize = 512;
+
+/// A sky with its texture.
+pub struct SkyMap<'a> {
+    sky: &'a Sky,
+    /// Cells along a side; 0 for no texture.
+    cells: usize,
+    /// Shares at the points of the six sides, x, y, z from below and from above, each row by row.
+    points: Vec<Lazy>,
+}
+
+impl<'a> SkyMap<'a> {
+    /// The texture of a sky, of which nothing is made yet.
+    pub fn new(sky: &'a Sky) -> Self {
+        // A side spans two radii.
+        let cells = (2.0 * sky.frequency.abs() * Noise::FINEST * CELLS_PER_OCTAVE_CELL).ceil();
+        let cells = if cells <= MOST_CELLS as f64 { (cells as usize).max(1) } else { 0 };
+        let points = if cells == 0 { 0 } else { 6 * (cells + 1) * (cells + 1) };
+        Self { sky, cells, points: Lazy::many(points) }
+    }
+
+    /// What a ray sees that leaves all objects behind.
+    pub fn seen<R: Real>(&self, ray: &Ray<R>) -> Vec3<R> {
+        let place = self.sky.place(ray);
+        let share = if self.cells == 0 { self.sky.share(place) } else { self.share(place) };
+        self.sky.colour(share)
+    }
+
+    /// As [`Sky::share`], by the texture.
+    fn share<R: Real>(&self, place: Vec3<R>) -> R {
+        let OnCube { side, cell, at } = OnCube::of(place, self.cells);
+        let within: [R; 2] = std::array::from_fn(|i| at[i] - R::of(cell[i] as f64));
+        let point = |bits: usize| R::of(self.point::<R>(side, [cell[0] + (bits & 1), cell[1] + (bits >> 1)]));
+        let mix = |a: R, b: R, share: R| a + (b - a) * share;
+        mix(mix(point(0), point(1), within[0]), mix(point(2), point(3), within[0]), within[1])
+    }
+
+    /// The share at a point of a side.
+    #[inline]
+    fn point<R: Real>(&self, side: usize, at: [usize; 2]) -> f64 {
+        let row = side * (self.cells + 1) + at[1];
+        self.points[row * (self.cells + 1) + at[0]].get(|| {
+            let (k, half) = (side / 2, R::of(0.5 * self.cells as f64));
+            let mut way = [half; 3];
+            way[k] = if side % 2 == 1 { half } else { -half };
+            for (i, at) in at.into_iter().enumerate() {
+                way[(k + 1 + i) % 3] = R::of(at as f64) - half;
+            }
+            let way = Vec3::new(way[0], way[1], way[2]).normalized();
+            self.sky.share(way * R::of(self.sky.radius)).get()
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+    use crate::scene::trace::bezier_surface;
+
+    #[test]
+    fn textures_are_the_noise_but_for_its_sharpest_tops() {
+        let world = bezier_surface(1);
+        let map = SkyMap::new(&world.sky);
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(3);
+        let (mut off, mut greatest, n) = (0.0, 0.0_f64, 20_000);
+        for _ in 0..n {
+            let dir = DVec3::from([(); 3].map(|()| rng.random_range(-1.0..1.0))).normalize();
+            let ray =
+                Ray { origin: Vec3::<f64>::of(40.0 * dir.any_orthonormal_vector()), dir: Vec3::of(dir) };
+            let place = world.sky.place(&ray);
+            let missed = (map.share(place) - world.sky.share(place)).abs();
+            (off, greatest) = (off + missed, greatest.max(missed));
+        }
+        assert!(
+            off / f64::from(n) < 0.75 / 255.0 && greatest < 6.0 / 255.0,
+            "{} {greatest}",
+            off / f64::from(n)
+        );
+    }
+
+    #[test]
+    fn sides_join() {
+        let world = bezier_surface(2);
+        let map = SkyMap::new(&world.sky);
+        for i in 0..500 {
+            // Across an edge of the cube, and past a corner.
+            let along = f64::from(i) / 250.0 - 1.0;
+            let share = |shift: f64| map.share(Vec3::<f64>::of(DVec3::new(1.0 + shift, along, 1.0 - shift)));
+            assert!((share(1e-9) - share(-1e-9)).abs() < 1e-6, "{along}");
+        }
+    }
+
+    #[test]
+    fn noise_of_many_waves_is_no_texture() {
+        let world = bezier_surface(1);
+        let sky = Sky { frequency: 40.0, ..world.sky };
+        let map = SkyMap::new(&sky);
+        let ray = Ray { origin: Vec3::<f64>::default(), dir: Vec3::of(DVec3::new(0.6, 0.0, 0.8)) };
+        assert_eq!(map.cells, 0);
+        assert_eq!(map.seen(&ray), sky.colour(sky.share(sky.place(&ray))));
+    }
+}
