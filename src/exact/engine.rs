@@ -62,7 +62,7 @@ mod cost {
         let of_face = match engine {
             Engine::Clip => 0.0,
             Engine::Raster => 45.0,
-            Engine::Walk => 260.0,
+            Engine::Walk => 300.0,
             Engine::Bvh => 350.0,
         };
         of_face * faces
