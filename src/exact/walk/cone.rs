@@ -62,10 +62,16 @@ impl<R: Record, F: FnMut(usize, &Segment, &mut R)> ConeRays<'_, R, F> {
         let width = self.region.columns.len();
         let first =
             (top - self.region.rows.start) as usize * width + (column - self.region.columns.start) as usize;
-        for j in (0..rows.count).filter(|&j| !rows.passes_by[j]) {
+        for j in 0..rows.count {
+            if rows.passes_by[j] {
+                continue;
+            }
             let (ray, length_mm) = (first + j * width, rows.lengths[j]);
-            let answer = rows.pass(j).map_or_else(|| rows.pass_from_there(j), |pass| Ok(Some(pass)));
-            rows.has_missed[j] = answer == Ok(None);
+            let answer = match rows.pass(j) {
+                None => rows.pass_from_there(j),
+                pass => Ok(pass),
+            };
+            rows.has_missed[j] = !matches!(answer, Ok(Some(_)));
             match answer {
                 Ok(Some(pass)) => note(self.record, ray, &pass, UNIT, length_mm),
                 Ok(None) => {}
@@ -93,7 +99,10 @@ struct Rows<'w> {
     exits: HeldFaces,
     /// Whether the row's rays have faces to begin with.
     has_faces: [bool; ABREAST],
-    /// Whether the last ray missed: the next may pass by far enough to say so at once.
+    /// Where rays begin that come after a miss: by planes through the source a walk around the outline would take more steps,
+    /// and find no face to hold.
+    seeds: [Seeds; ABREAST],
+    /// Whether the last ray missed, or was in doubt: the next may pass by far enough to say so at once.
     has_missed: [bool; ABREAST],
     /// Whether this one does.
     passes_by: [bool; ABREAST],
@@ -118,6 +127,7 @@ impl<'w> Rows<'w> {
             entries: HeldFaces::new(-1.0),
             exits: HeldFaces::new(1.0),
             has_faces: [false; ABREAST],
+            seeds: [Seeds { entry: 0, exit: 0 }; ABREAST],
             has_missed: [true; ABREAST],
             passes_by: [false; ABREAST],
         }
@@ -178,16 +188,16 @@ impl<'w> Rows<'w> {
                 self.begin_row(j);
             }
         }
-        let Self { walker, source, dirs, sizes, passes_by, count, sure, entries, exits, .. } = self;
+        let Self { walker, source, dirs, sizes, has_missed, count, sure, entries, exits, .. } = self;
         let groups = count.next_multiple_of(LANES) / S::F64_LANES;
         for held in [entries, exits] {
             held.look(simd, groups, dirs, sizes, *sure);
             let mut walking = [0; ABREAST];
             let mut left = 0;
-            for (j, (margin, passes_by)) in held.margins.iter().zip(&*passes_by).take(*count).enumerate() {
+            for (j, (margin, has_missed)) in held.margins.iter().zip(&*has_missed).take(*count).enumerate() {
                 // Branches would not be foreseen.
                 walking[left] = j as u8;
-                left += usize::from((*margin <= 0.0) & !passes_by);
+                left += usize::from((*margin <= 0.0) & !has_missed);
             }
             for &j in &walking[..left] {
                 let j = j as usize % ABREAST;
@@ -197,18 +207,12 @@ impl<'w> Rows<'w> {
         }
     }
 
-    /// Stands on faces by the table.
+    /// Takes seeds from the table.
     #[inline(never)]
     fn begin_row(&mut self, j: usize) {
         match self.walker.seeds.near(self.source, dir_of(&self.dirs, j)) {
             None => self.passes_by[j] = true,
-            Some(Seeds { entry, exit }) => {
-                self.has_faces[j] = true;
-                for (held, face) in [(&mut self.entries, entry), (&mut self.exits, exit)] {
-                    let footing = Footing::new(self.walker, self.source, face, held.sign);
-                    held.stand_on(self.walker, self.source, j, &footing);
-                }
-            }
+            Some(seeds) => (self.has_faces[j], self.seeds[j]) = (true, seeds),
         }
     }
 
@@ -223,11 +227,22 @@ impl<'w> Rows<'w> {
         Some(Pass { chord, entry_face: entries.half_edges[j] / 4, exit_face: exits.half_edges[j] / 4 })
     }
 
-    /// The same by the walk proper, from the faces that were reached.
+    /// The same by the walk proper, from the faces that were reached, or from the seeds after a miss; what it goes through then is
+    /// held.
     #[cold]
     #[inline(never)]
-    fn pass_from_there(&self, j: usize) -> Result<Option<Pass>, Unsure> {
-        let mut seeds = Seeds { entry: self.entries.half_edges[j] / 4, exit: self.exits.half_edges[j] / 4 };
-        self.walker.pass_from(self.source, dir_of(&self.dirs, j), &mut seeds)
+    fn pass_from_there(&mut self, j: usize) -> Result<Option<Pass>, Unsure> {
+        if !self.has_missed[j] {
+            self.seeds[j] =
+                Seeds { entry: self.entries.half_edges[j] / 4, exit: self.exits.half_edges[j] / 4 };
+        }
+        let answer = self.walker.pass_from(self.source, dir_of(&self.dirs, j), &mut self.seeds[j]);
+        if let (true, Ok(Some(pass))) = (self.has_missed[j], &answer) {
+            for (held, face) in [(&mut self.entries, pass.entry_face), (&mut self.exits, pass.exit_face)] {
+                let footing = Footing::new(self.walker, self.source, face, held.sign);
+                held.stand_on(self.walker, self.source, j, &footing);
+            }
+        }
+        answer
     }
 }
