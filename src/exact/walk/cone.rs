@@ -97,11 +97,9 @@ struct Rows<'w> {
     sizes: OfRays,
     entries: HeldFaces,
     exits: HeldFaces,
-    /// Whether the row's rays have faces to begin with.
-    has_faces: [bool; ABREAST],
-    /// Where rays begin that come after a miss: by planes through the source a walk around the outline would take more steps,
-    /// and find no face to hold.
-    seeds: [Seeds; ABREAST],
+    /// Where rays begin that come after a miss, once the row has come near the body: by planes through the source a walk around
+    /// the outline would take more steps, and find no face to hold.
+    seeds: [Option<Seeds>; ABREAST],
     /// Whether the last ray missed, or was in doubt: the next may pass by far enough to say so at once.
     has_missed: [bool; ABREAST],
     /// Whether this one does.
@@ -126,8 +124,7 @@ impl<'w> Rows<'w> {
             sizes: NONE,
             entries: HeldFaces::new(-1.0),
             exits: HeldFaces::new(1.0),
-            has_faces: [false; ABREAST],
-            seeds: [Seeds { entry: 0, exit: 0 }; ABREAST],
+            seeds: [None; ABREAST],
             has_missed: [true; ABREAST],
             passes_by: [false; ABREAST],
         }
@@ -141,7 +138,7 @@ impl<'w> Rows<'w> {
         for j in 0..ABREAST {
             set(&mut self.offsets, j, (f64::from(top) + j as f64) * by_row);
         }
-        self.has_faces = [false; ABREAST];
+        self.seeds = [None; ABREAST];
         self.has_missed = [true; ABREAST];
     }
 
@@ -184,7 +181,7 @@ impl<'w> Rows<'w> {
     #[inline(always)]
     fn find_faces<S: Simd>(&mut self, simd: S) {
         for j in 0..self.count {
-            if !self.passes_by[j] && !self.has_faces[j] {
+            if !self.passes_by[j] && self.seeds[j].is_none() {
                 self.begin_row(j);
             }
         }
@@ -210,10 +207,8 @@ impl<'w> Rows<'w> {
     /// Takes seeds from the table.
     #[inline(never)]
     fn begin_row(&mut self, j: usize) {
-        match self.walker.seeds.near(self.source, dir_of(&self.dirs, j)) {
-            None => self.passes_by[j] = true,
-            Some(seeds) => (self.has_faces[j], self.seeds[j]) = (true, seeds),
-        }
+        self.seeds[j] = self.walker.seeds.near(self.source, dir_of(&self.dirs, j));
+        self.passes_by[j] = self.seeds[j].is_none();
     }
 
     /// The way of a row's ray through the body, if both faces are surely pierced.
@@ -232,11 +227,10 @@ impl<'w> Rows<'w> {
     #[cold]
     #[inline(never)]
     fn pass_from_there(&mut self, j: usize) -> Result<Option<Pass>, Unsure> {
-        if !self.has_missed[j] {
-            self.seeds[j] =
-                Seeds { entry: self.entries.half_edges[j] / 4, exit: self.exits.half_edges[j] / 4 };
-        }
-        let answer = self.walker.pass_from(self.source, dir_of(&self.dirs, j), &mut self.seeds[j]);
+        let reached = Seeds { entry: self.entries.half_edges[j] / 4, exit: self.exits.half_edges[j] / 4 };
+        let mut seeds = self.seeds[j].filter(|_| self.has_missed[j]).unwrap_or(reached);
+        let answer = self.walker.pass_from(self.source, dir_of(&self.dirs, j), &mut seeds);
+        self.seeds[j] = Some(seeds);
         if let (true, Ok(Some(pass))) = (self.has_missed[j], &answer) {
             for (held, face) in [(&mut self.entries, pass.entry_face), (&mut self.exits, pass.exit_face)] {
                 let footing = Footing::new(self.walker, self.source, face, held.sign);
