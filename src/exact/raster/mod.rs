@@ -12,15 +12,17 @@
 //! A vertex is rounded once, for all its faces, and what they cover is exact for its rounded place: a closed surface is
 //! seen as a closed complex of triangles, so that every ray goes in as often as out, whatever the pixels hit.
 //!
-//! Faces that lie together are seen as a patch (`patches`), or passed over as a whole. A length in a convex body is one
-//! quotient of a pixel's two depths: where faces are small, those are kept by pixel (`chords`, `small`); where they are large, rows are
-//! cut where a face ends (`stretches`).
+//! Faces that lie together are seen as a patch (`patches`), or passed over as a whole. Crossings are reported one by one
+//! (`crossings`), unless the body is convex and nobody asks for faces: a length is one quotient of a pixel's two depths then.
+//! Where faces are small, those are kept by pixel (`chords`, `small`); where they are large, rows are cut where a face ends
+//! (`stretches`).
 //!
 //! Scan conversion with the usual fill rule (Pineda 1988, doi:10.1145/54852.378457), made exact as Shewchuk's adaptive
 //! predicates are: by a float where that can tell, by an exact sign where it cannot.
 
 mod aspect;
 mod chords;
+mod crossings;
 mod edge_on;
 mod face;
 mod near;
