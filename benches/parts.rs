@@ -1,14 +1,18 @@
 //! The parts of a tree by criterion: what sampling, fitting, descending, answering runs of pixels and forgetting cost, each
-//! by itself. The engines that sample for them are in `exact`, whole trees in `trees`.
+//! by itself; of trees of smooth objects, what a hit costs, and a way through glass. The engines that sample chords are in
+//! `exact`, whole trees in `trees`.
 
 use std::hint::black_box;
 
 use chordfield::attributes::chord::ChordLength;
 use chordfield::attributes::squared_chord::{ImageChords, SquaredChord};
 use chordfield::exact::{Body, Engine};
-use chordfield::geometry::RayGrid;
+use chordfield::geometry::{Ray, RayGrid};
 use chordfield::linespace::{LinePoint, PlanePair};
 use chordfield::ritree::{Attribute, Cache, Fit, FittedTree, Parameters, Place, RiTree};
+use chordfield::scene::trace::{Camera, Recipe, World, bezier_surface, random_volumes};
+use chordfield::surface::optics::follow;
+use chordfield::surface::{Reach, Slabs, Surface};
 use common::body::Ellipsoid;
 use common::samples::few_samples;
 use common::{random, view};
@@ -27,6 +31,12 @@ const TOLERANCE_MM: f64 = 0.5;
 
 /// Cells are of this depth: those about which most trees end.
 const FIT_DEPTH: u32 = 20;
+
+/// Columns and rows of the picture whose rays are held against smooth surfaces.
+const PICTURE: (u32, u32) = (600, 600);
+
+/// Glass bodies, of which the first is looked at.
+const VOLUMES: Recipe = Recipe { seed: 1, count: 8 };
 
 fn body() -> Body {
     let body = Body::new(Ellipsoid::BENCH.surface(SUBDIVISIONS));
@@ -175,9 +185,59 @@ fn traced(criterion: &mut Criterion) {
     group.finish();
 }
 
+/// The rays of a camera that meet a surface's box, in the picture's order: those that hit the surface, and those that miss it.
+/// Others are told by the box alone.
+fn rays_to(surface: &Surface, camera: &Camera) -> [Vec<Ray<f64>>; 2] {
+    let (columns, rows) = PICTURE;
+    let bounds = surface.bounds();
+    let (hits, misses) = (0..rows)
+        .flat_map(|row| (0..columns).map(move |column| [column, row].map(|pixel| f64::from(pixel) + 0.5)))
+        .map(|[x, y]| camera.ray(PICTURE, x, y))
+        .filter(|ray| Slabs::new(ray).stretch(&bounds).is_some())
+        .partition(|ray| surface.hit(ray, Reach::whole()).is_some());
+    [hits, misses]
+}
+
+/// The first hits of smooth surfaces, without any shading: a mirroring sheet of 100 patches, and a body of glass.
+fn hit(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("hit");
+    let volumes = random_volumes(VOLUMES).expect("a few volumes");
+    for (name, World { objects, cameras, .. }) in [("sheet", bezier_surface(1)), ("glass body", volumes)] {
+        let surface = &objects[0].surface;
+        for (what, rays) in ["met", "missed"].into_iter().zip(rays_to(surface, &cameras[0])) {
+            group.throughput(Throughput::Elements(rays.len() as u64));
+            group.bench_function(format!("{name} {what}"), |bencher| {
+                bencher.iter(|| {
+                    rays.iter().filter(|ray| black_box(surface.hit(ray, Reach::whole())).is_some()).count()
+                });
+            });
+        }
+    }
+    group.finish();
+}
+
+/// From a hit of a glass body to where the light leaves it: what a sample of its tree costs beside the hit.
+fn way(criterion: &mut Criterion) {
+    let World { objects, cameras, most_inner_turns, .. } = random_volumes(VOLUMES).expect("a few volumes");
+    let surface = &objects[0].surface;
+    let optics = objects[0].material.optics().expect("glass");
+    let [rays, _] = rays_to(surface, &cameras[0]);
+    let hits: Vec<_> = rays.iter().filter_map(|ray| Some((ray, surface.hit(ray, Reach::whole())?))).collect();
+    let mut group = criterion.benchmark_group("follow");
+    group.throughput(Throughput::Elements(hits.len() as u64));
+    group.bench_function("glass body", |bencher| {
+        bencher.iter(|| {
+            for (ray, hit) in &hits {
+                black_box(follow(surface, ray, *hit, optics, most_inner_turns));
+            }
+        });
+    });
+    group.finish();
+}
+
 criterion_group! {
     name = parts;
     config = few_samples();
-    targets = sample, fit, descent, leaf_run, prune, traced
+    targets = sample, fit, descent, leaf_run, prune, traced, hit, way
 }
 criterion_main!(parts);
