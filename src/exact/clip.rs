@@ -83,7 +83,7 @@ impl ConvexClipper {
 
     #[inline(always)]
     fn trace_one<R: Record>(&self, ray: usize, segment: &Segment, record: &mut R) {
-        let Some(chord) = self.chord(segment.line()) else { return };
+        let Some(chord) = self.chord_here(segment.line()) else { return };
         let part = chord.intersection(&segment.reach()).filter(|part| part.length() > 0.0);
         if let Some(part) = part {
             let [entry, exit] =
@@ -113,8 +113,13 @@ impl ConvexClipper {
     /// The body is closed: a line in a face's plane counts its length in the face. Each plane's crossing is
     /// `n·(v − o) / n·d` with a relative error of γ₈ of |v − o| / |n·d|, so the chord is exact for a line moved by no
     /// more than γ₈ of its distance to the body.
-    #[inline(always)]
     pub fn chord(&self, line: &Line) -> Option<Interval> {
+        crate::dispatch::arch().dispatch(Chord { clipper: self, line })
+    }
+
+    /// The same by the instructions that the caller has.
+    #[inline(always)]
+    fn chord_here(&self, line: &Line) -> Option<Interval> {
         let (o, d) = (line.origin().to_array(), line.dir().to_array());
         let mut enter = [f64::NEG_INFINITY; LANES];
         let mut leave = [f64::INFINITY; LANES];
@@ -155,6 +160,21 @@ impl<R: Record> WithSimd for Trace<'_, R> {
         for (i, segment) in self.segments.iter().enumerate() {
             self.clipper.trace_one(self.first + i, segment, self.record);
         }
+    }
+}
+
+/// [`ConvexClipper::chord`], likewise.
+struct Chord<'a> {
+    clipper: &'a ConvexClipper,
+    line: &'a Line,
+}
+
+impl WithSimd for Chord<'_> {
+    type Output = Option<Interval>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Option<Interval> {
+        self.clipper.chord_here(self.line)
     }
 }
 
@@ -217,6 +237,9 @@ mod tests {
             lengths.into_iter().map(f64::to_bits).collect::<Vec<_>>()
         };
         assert_eq!(trace(pulp::Arch::new()), trace(pulp::Arch::Scalar));
+        for ray in &rays {
+            assert_eq!(ball.chord(ray.line()), ball.chord_here(ray.line()));
+        }
     }
 
     #[test]
