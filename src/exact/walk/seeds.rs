@@ -28,6 +28,8 @@ pub(super) struct SeedTable {
     holding_squared: f64,
     /// About half the width of a few faces: so far within the outline are seeds for lines that pass by.
     inset: f64,
+    /// By so much the surface's distance may differ from what was assumed. Farther off, it is looked up again.
+    radius_tolerance: f64,
     /// Cells along each side of the square.
     side: usize,
     cells: Vec<Seed>,
@@ -40,14 +42,6 @@ struct Seed {
     radius: f32,
 }
 
-impl Seed {
-    /// Whether the surface is about where a ball of radius 1 is.
-    #[inline(always)]
-    fn is_near_ball(&self) -> bool {
-        (f64::from(self.radius) - 1.0).abs() <= RADIUS_TOLERANCE
-    }
-}
-
 /// The table has two cells for each face, so that most walks are of a step or none, up to two megabytes.
 const LARGEST_SIDE: usize = 512;
 const SMALLEST_SIDE: usize = 4;
@@ -55,8 +49,12 @@ const SMALLEST_SIDE: usize = 4;
 /// A face seen less edge-on than this looks along a line whatever the rounding.
 const FACING: f64 = 1e-3;
 
-/// Where the surface's distance differs from what was assumed by more than this share, it is looked up again.
+/// The least tolerance of the surface's distance.
 const RADIUS_TOLERANCE: f64 = 0.02;
+
+/// The corners of a round body of F faces lie beyond its ball by 3.7/F, 5 % if they are 80. To look up all lines again for that costs
+/// more than a step: within this part of the inset, 1/√F, the face found is next to the right one.
+const TOLERANCE_OF_INSET: f64 = 1.0 / 6.0;
 
 /// A line passes a ball by surely if its squared distance from the middle is greater by this share of the origin's squared
 /// distance: two linear maps of three products each, the foot of the perpendicular, a square: fewer than 40 roundings.
@@ -70,6 +68,7 @@ impl SeedTable {
             to_ball: DMat3::IDENTITY,
             holding_squared: f64::INFINITY,
             inset: 0.0,
+            radius_tolerance: RADIUS_TOLERANCE,
             side: 1,
             cells: vec![Seed::default()],
         }
@@ -83,11 +82,13 @@ impl SeedTable {
         let (middle, to_ball) = ball_of_inertia(corners, bounds);
         let radius_squared = |v: &DVec3| (to_ball * (*v - middle)).length_squared();
         let farthest = walker.vertices.iter().map(radius_squared).fold(0.0, f64::max);
+        let inset = 6.0 / (walker.faces.len() as f64).sqrt();
         let mut table = Self {
             middle,
             to_ball,
             holding_squared: farthest * (1.0 + PASSING_BY),
-            inset: 6.0 / (walker.faces.len() as f64).sqrt(),
+            inset,
+            radius_tolerance: RADIUS_TOLERANCE.max(TOLERANCE_OF_INSET * inset),
             side,
             cells: vec![Seed::default(); side * side],
         };
@@ -136,7 +137,7 @@ impl SeedTable {
                 self.cell(foot + (sign * half.sqrt()) * d)
             };
             let first = at(1.0);
-            if first.is_near_ball() { first.face } else { at(f64::from(first.radius)).face }
+            if self.is_near_ball(first) { first.face } else { at(f64::from(first.radius)).face }
         };
         Some(Seeds { entry: crossing(-1.0), exit: crossing(1.0) })
     }
@@ -175,7 +176,7 @@ impl SeedTable {
             if over[i] > 0.0 {
                 continue;
             }
-            found[i] = if entry.is_near_ball() && exit.is_near_ball() {
+            found[i] = if self.is_near_ball(entry) && self.is_near_ball(exit) {
                 Some(Seeds { entry: entry.face, exit: exit.face })
             } else {
                 self.near(ray.line().origin(), ray.line().dir())
@@ -216,6 +217,12 @@ impl SeedTable {
         let face = self.cell(self.to_ball * dir).face;
         let looks_along = walker.faces[face as usize].normal.dot(dir) > FACING * dir.length();
         if looks_along { face } else { leaving(walker, self.middle, dir, face) }
+    }
+
+    /// Whether the surface is there about where a ball of radius 1 is.
+    #[inline(always)]
+    fn is_near_ball(&self, seed: Seed) -> bool {
+        (f64::from(seed.radius) - 1.0).abs() <= self.radius_tolerance
     }
 
     #[inline]
