@@ -1,9 +1,11 @@
 //! Whether the engine that is taken unasked is the quickest: over bodies of few and of many faces, convex and not, images of few
-//! and of many pixels, and rays in no order.
+//! and of many pixels, and rays in no order, in a batch and one by one.
 
+use std::hint::black_box;
 use std::time::Instant;
 
 use chordfield::exact::{Body, Engine, Lengths};
+use chordfield::geometry::Segment;
 use chordfield::geometry::primitives::icosphere;
 use glam::{DMat3, DVec3};
 
@@ -28,6 +30,14 @@ const PART_ROWS: u32 = 32;
 
 /// Fewer parts would not stand for all: there are more misses at the top of an image than in its middle.
 const FEWEST_PARTS: usize = 6;
+
+/// What is asked of a body.
+enum Asked {
+    /// The lengths of rays, all at once.
+    AtOnce(RaySet),
+    /// The parts of each ray's line.
+    OneByOne(Vec<Segment>),
+}
 
 /// The engines' times for one body and one set of rays.
 pub struct Choice {
@@ -59,17 +69,21 @@ pub fn each_choice(rounds: usize, mut each: impl FnMut(&Choice)) {
             let mesh = body.surface().mesh().clone();
             let images = SIDES.map(|side| (format!("{side}²"), RaySet::Grid(view::window(&mesh, side))));
             let batch = ("random".to_owned(), RaySet::Batch(random::rays(BATCH)));
-            for (name, rays) in images.into_iter().chain([batch]) {
+            let sets = images.into_iter().chain([batch]).map(|(name, set)| (name, Asked::AtOnce(set)));
+            let lines = ("one by one".to_owned(), Asked::OneByOne(random::rays(ENOUGH)));
+            for (rays, asked) in sets.chain([lines]) {
                 let serving = [Engine::Clip, Engine::Walk, Engine::Raster, Engine::Bvh]
                     .into_iter()
-                    .filter(|engine| engine.serves(&body) && takes(*engine, &body, &rays));
-                let times = serving.map(|engine| (engine, nanoseconds_per_ray(&body, engine, &rays, rounds)));
-                let chosen = match &rays {
-                    RaySet::Grid(grid) => body.view(grid, None).engine(),
-                    RaySet::Batch(_) => body.engine_for_rays(),
+                    .filter(|engine| engine.serves(&body) && takes(*engine, &body, &asked));
+                let times =
+                    serving.map(|engine| (engine, nanoseconds_per_ray(&body, engine, &asked, rounds)));
+                let chosen = match &asked {
+                    Asked::AtOnce(RaySet::Grid(grid)) => body.view(grid, None).engine(),
+                    Asked::AtOnce(RaySet::Batch(_)) => body.engine_for_rays(),
+                    Asked::OneByOne(_) => body.engine_for_line(),
                 };
                 let faces = mesh.faces.len();
-                each(&Choice { shape, faces, rays: name, times: times.collect(), chosen });
+                each(&Choice { shape, faces, rays, times: times.collect(), chosen });
             }
         }
     }
@@ -87,23 +101,37 @@ fn bodies(subdivisions: u32) -> Vec<(&'static str, Body)> {
 }
 
 /// Whether an engine takes a set of rays, and not longer than anybody would wait.
-fn takes(engine: Engine, body: &Body, rays: &RaySet) -> bool {
+fn takes(engine: Engine, body: &Body, asked: &Asked) -> bool {
     match engine {
         Engine::Clip => body.surface().mesh().faces.len() <= MOST_CLIPPED_FACES,
-        Engine::Raster => matches!(rays, RaySet::Grid(_)),
+        Engine::Raster => matches!(asked, Asked::AtOnce(RaySet::Grid(_))),
         Engine::Walk | Engine::Bvh => true,
     }
 }
 
 /// The median over rounds, the first of which, that makes ready, is left out.
-fn nanoseconds_per_ray(body: &Body, engine: Engine, rays: &RaySet, rounds: usize) -> f64 {
-    let mut times: Vec<f64> = (0..=rounds).map(|_| once(body, engine, rays)).skip(1).collect();
+fn nanoseconds_per_ray(body: &Body, engine: Engine, asked: &Asked, rounds: usize) -> f64 {
+    let once = || match asked {
+        Asked::AtOnce(rays) => at_once(body, engine, rays),
+        Asked::OneByOne(rays) => one_by_one(body, engine, rays),
+    };
+    let mut times: Vec<f64> = (0..=rounds).map(|_| once()).skip(1).collect();
     times.sort_by(f64::total_cmp);
     times[times.len() / 2]
 }
 
+fn one_by_one(body: &Body, engine: Engine, rays: &[Segment]) -> f64 {
+    let mut parts = Vec::new();
+    let start = Instant::now();
+    for ray in rays {
+        body.chords_by(engine, ray.line(), &mut parts);
+        black_box(&parts);
+    }
+    1e9 * start.elapsed().as_secs_f64() / rays.len() as f64
+}
+
 /// The raster is timed on all rays, as it makes ready for them all; others on a share of them.
-fn once(body: &Body, engine: Engine, rays: &RaySet) -> f64 {
+fn at_once(body: &Body, engine: Engine, rays: &RaySet) -> f64 {
     let parts = match rays {
         _ if engine == Engine::Raster => vec![rays.whole()],
         RaySet::Grid(grid) => rays.parts(PARTS.min(grid.size().1 / PART_ROWS)),

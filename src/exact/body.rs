@@ -119,7 +119,7 @@ impl Body {
     /// The parts of `line` in the body, mm along `dir`, in order and disjoint; written to `parts`. By the engine that is
     /// the quickest for a line on its own.
     pub fn chords(&self, line: &Line, parts: &mut Vec<Interval>) {
-        self.chords_by(self.engine_for_rays(), line, parts);
+        self.chords_by(self.engine_for_line(), line, parts);
     }
 
     /// As [`chords`](Self::chords), by an engine of choice; by another where that does not [serve](Engine::serves).
@@ -136,7 +136,7 @@ impl Body {
     /// From the entry to the last exit of `line`, mm along `dir`: the chord of a convex body. As [`chords`](Self::chords)
     /// finds them, but without a list. `None` if it misses.
     pub fn whole_chord(&self, line: &Line) -> Option<Interval> {
-        self.convex_chord_by(self.engine_for_rays(), line).unwrap_or_else(|Unsure| {
+        self.convex_chord_by(self.engine_for_line(), line).unwrap_or_else(|Unsure| {
             let mut parts = Vec::new();
             self.bvh().chords(self.surface(), line, &mut parts);
             // A line along a face may leave and enter again within rounding.

@@ -6,7 +6,7 @@ use rand::{RngExt, SeedableRng};
 use super::judge::length_in_parallel_body;
 use super::{Body, Engine, Lengths};
 use crate::geometry::primitives::{cube, icosphere, inside_out};
-use crate::geometry::{ClosedMesh, ConvexMesh, RayGrid, TriMesh, Upstream, convex_hull};
+use crate::geometry::{ClosedMesh, ConvexMesh, RayGrid, Segment, TriMesh, Upstream, convex_hull};
 
 const ENGINES: [Engine; 4] = [Engine::Clip, Engine::Walk, Engine::Raster, Engine::Bvh];
 
@@ -140,6 +140,32 @@ fn an_engine_that_does_not_serve_gives_way_to_one_that_does() {
         .expect("a grid");
     for engine in [Engine::Clip, Engine::Walk] {
         assert!(body.view(&grid, Some(engine)).engine().serves(&body));
+    }
+}
+
+#[test]
+fn what_a_ray_gets_in_a_batch_depends_on_the_body_not_on_the_batch() {
+    let mut rng = rand_pcg::Pcg64::seed_from_u64(11);
+    let mut point = || DVec3::from([0; 3].map(|_| rng.random_range(-1.0..1.0)));
+    let towards = |(a, b): (DVec3, DVec3)| Segment::between(300.0 * a.normalize(), 40.0 * b);
+    let rays: Vec<Segment> = (0..2_000).filter_map(|_| towards((point(), point()))).collect();
+    // Of 20, 80 and 320 planes.
+    let chosen =
+        [(0, [Engine::Clip, Engine::Clip]), (1, [Engine::Clip, Engine::Walk]), (2, [Engine::Walk; 2])];
+    for (subdivisions, engines) in chosen {
+        let mesh = icosphere(subdivisions).map_vertices(|v| DVec3::new(60.0, 50.0, 40.0) * v);
+        let body = Body::new(ClosedMesh::new(mesh).expect("closed").0);
+        assert_eq!([body.engine_for_line(), body.engine_for_rays()], engines);
+        let in_batches_of = |count: usize| {
+            let mut lengths = vec![0.0; rays.len()];
+            for (i, batch) in rays.chunks(count).enumerate() {
+                body.trace(engines[1], i * count, batch, &mut Lengths(&mut lengths));
+            }
+            lengths
+        };
+        let at_once = in_batches_of(rays.len());
+        assert!(at_once.iter().filter(|length| **length > 0.0).count() > 1_000);
+        assert!([1, 7, 33].into_iter().all(|count| in_batches_of(count) == at_once));
     }
 }
 
