@@ -136,6 +136,6 @@ impl<R: Real> Search for Nearest<'_, R> {
         self.reach.to = if self.any { R::of(f64::NEG_INFINITY) } else { t };
         let size = self.mesh.magnitude + self.ray.origin.get().abs().max_element();
         let error = gamma(32) * size;
-        self.best = Some(Hit { t, normal: normal.normalized(), enters, class: 1, error });
+        self.best = Some(Hit { t, normal: normal.normalized(), enters, class: 1, error, part: None });
     }
 }

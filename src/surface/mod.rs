@@ -46,6 +46,8 @@ pub struct Hit<R> {
     pub class: u32,
     /// How far rounding may have moved the place, as a length.
     pub error: f64,
+    /// The part of the surface that is hit, where it has parts.
+    pub part: Option<u32>,
 }
 
 /// Which crossings count.
@@ -78,12 +80,14 @@ pub struct Reach<R> {
     pub to: R,
     /// Which crossings count.
     pub crossing: Crossing,
+    /// The [part](Hit::part) that the ray starts on. Where no line of its slope meets a part twice, it is not searched again.
+    pub left: Option<u32>,
 }
 
 impl<R: Real> Reach<R> {
     /// The whole ray, every crossing.
     pub fn whole() -> Self {
-        Self { from: R::of(0.0), to: R::of(f64::INFINITY), crossing: Crossing::Any }
+        Self { from: R::of(0.0), to: R::of(f64::INFINITY), crossing: Crossing::Any, left: None }
     }
 
     /// As this, for one kind of crossing.

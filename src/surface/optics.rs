@@ -68,7 +68,7 @@ pub fn follow<R: Real>(surface: &Surface, ray: &Ray<R>, hit: Hit<R>, optics: Opt
         turns += 1;
         // A ray in glass next leaves it, and one outside next enters it: not where it is, unless rounding says so.
         let from = R::of(steady_gap(at.error, dir.dot(at.normal).get()));
-        let next = surface.hit(&ray, Reach { from, crossing, ..Reach::whole() });
+        let next = surface.hit(&ray, Reach { from, crossing, left: at.part, ..Reach::whole() });
         let last_class = at.class;
         match next {
             None => return Path { hit, exit: Some(ray), turns, last_class },

@@ -124,13 +124,15 @@ impl Piece {
         [Self::new(patch, self.patch, self.low, size), Self::new(patch, self.patch, upper, size)]
     }
 
-    /// Calls `found` for each root of the ray on the piece, its edges included. A ray that only touches the piece, nearer
+    /// Calls `found` for each root of the ray on the piece, its edges included. A ray that `is_leaving` starts on the piece; that
+    /// root is left out where it is certain to be the only one. A ray that only touches the piece, nearer
     /// to it than rounding can tell, does not cross it.
     pub fn roots<R: Real>(
         &self,
         patch: &BezierPatch,
         ray: &Ray<R>,
         reach: f64,
+        is_leaving: bool,
         found: &mut impl FnMut(Root<R>),
     ) {
         // c = d × (o − centre): the ray's moment about the middle.
@@ -142,6 +144,9 @@ impl Piece {
         let tolerance = 2.0 * self.longest * gamma(OPERATIONS) * (reach + self.magnitude) / steepness.get()
             + PARAMETER_ACCURACY;
         if kappa.get() <= LARGEST_KAPPA && tolerance <= LARGEST_TOLERANCE {
+            if is_leaving {
+                return;
+            }
             let over = R::of(1.0) / det;
             let start = [Vec3::of(self.b).dot(moment) * over, -(Vec3::of(self.a).dot(moment) * over)];
             // A root in the piece is nearer to the linear root than κ times half the piece.
@@ -232,7 +237,7 @@ impl Piece {
                 return;
             }
         }
-        self.halves(patch, self.longer()).iter().for_each(|half| half.roots(patch, ray, reach, found));
+        self.halves(patch, self.longer()).iter().for_each(|half| half.roots(patch, ray, reach, false, found));
     }
 
     /// Whether a plane along the ray parts its line from the piece: across d and a, or d and b. On the piece S is no farther

@@ -96,13 +96,14 @@ impl<'a, R: Real> Aim<'a, R> {
         Self { shell, ray, slabs: Slabs::new(ray), magnitude }
     }
 
-    fn roots(&self, item: u32, mut found: impl FnMut(Hit<R>)) {
+    fn roots(&self, item: u32, left: Option<u32>, mut found: impl FnMut(Hit<R>)) {
         let piece = &self.shell.pieces[item as usize];
         let patch = &self.shell.patches[piece.patch as usize];
         let class = self.shell.classes[piece.patch as usize];
-        piece.roots(patch, self.ray, self.magnitude, &mut |root: Root<R>| {
+        let is_leaving = left == Some(item);
+        piece.roots(patch, self.ray, self.magnitude, is_leaving, &mut |root: Root<R>| {
             let enters = self.ray.dir.dot(root.normal).get() < 0.0;
-            found(Hit { t: root.t, normal: root.normal, enters, class, error: root.error });
+            found(Hit { t: root.t, normal: root.normal, enters, class, error: root.error, part: Some(item) });
         });
     }
 }
@@ -131,7 +132,7 @@ impl<R: Real> Search for Nearest<'_, R> {
             return;
         }
         let (reach, best, any) = (&mut self.reach, &mut self.best, self.any);
-        self.aim.roots(item, |hit| {
+        self.aim.roots(item, reach.left, |hit| {
             if reach.admits(hit.t, hit.enters) {
                 reach.to = if any { R::of(f64::NEG_INFINITY) } else { hit.t };
                 *best = Some(Hit { normal: hit.normal.normalized(), ..hit });
@@ -158,7 +159,7 @@ impl<R: Real> Search for All<'_, R> {
 
     fn item(&mut self, item: u32) {
         let hits = &mut self.hits;
-        self.aim.roots(item, |hit| {
+        self.aim.roots(item, None, |hit| {
             if hit.t.get() > 0.0 {
                 hits.push(Hit { normal: hit.normal.normalized(), ..hit });
             }

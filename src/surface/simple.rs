@@ -42,7 +42,7 @@ impl Sphere {
         let (t, enters) = first.into_iter().find(|&(t, enters)| reach.admits(t, enters))?;
         let normal = (ray.dir * (t - middle) - off) * R::of(1.0 / self.radius);
         let size = ray.origin.get().abs().max_element() + self.centre.abs().max_element() + self.radius;
-        Some(Hit { t, normal, enters, class: 1, error: gamma(16) * size })
+        Some(Hit { t, normal, enters, class: 1, error: gamma(16) * size, part: None })
     }
 }
 
@@ -84,7 +84,7 @@ impl Disc {
             return None;
         }
         let size = ray.origin.get().abs().max_element() + self.centre.abs().max_element() + self.radius;
-        Some(Hit { t, normal, enters, class: 1, error: gamma(16) * size })
+        Some(Hit { t, normal, enters, class: 1, error: gamma(16) * size, part: None })
     }
 }
 
@@ -118,6 +118,6 @@ impl Block {
         normal[axis] = place[axis].signum();
         let class = 1 + 2 * axis as u32 + u32::from(place[axis] < 0.0);
         let size = ray.origin.get().abs().max_element() + self.bounds.max.abs().max_element();
-        Some(Hit { t, normal: Vec3::of(normal), enters, class, error: gamma(16) * size })
+        Some(Hit { t, normal: Vec3::of(normal), enters, class, error: gamma(16) * size, part: None })
     }
 }
