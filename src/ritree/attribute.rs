@@ -59,10 +59,16 @@ pub trait Attribute: Sync {
     /// more usable samples are extrapolated.
     fn interpolate(&self, parts: &[(Self::Real, &Self::Output)]) -> Self::Output;
 
-    /// The class of a line, by the one intersection test of §2.5, asked when a cell holds exactly two. `None` if the test
-    /// costs as much as tracing the line, which is then done instead.
-    fn locate(&self, _line: LinePoint) -> Option<u32> {
+    /// The outline of a line, by the one intersection test of §2.5, asked when a cell holds exactly two classes of them. `None`
+    /// if the test costs as much as tracing the line, which is then done instead.
+    fn locate(&self, _line: LinePoint) -> Option<Self::Output> {
         None
+    }
+
+    /// The output of a line that was [located](Self::locate) and interpolated from samples of its class: what its outline
+    /// knows, it knows better.
+    fn told(&self, _outline: &Self::Output, interpolated: Self::Output) -> Self::Output {
+        interpolated
     }
 
     /// Whether the class stands for lines that do not meet the object.

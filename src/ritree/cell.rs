@@ -155,8 +155,15 @@ impl Place {
     ) -> Verdict {
         let is_deepest = self.depth.saturating_add(attribute.levels_spared()) >= parameters.max_depth
             || self.is_deepest(parameters);
-        if let Some(mixed) = mixed(corners, |c| attribute.outline_class(c), is_deepest) {
-            return mixed;
+        match classes(corners, |c| attribute.outline_class(c)) {
+            Classes::One => {}
+            // No interpolant crosses a discontinuity; smaller cells leave fewer lines on it.
+            _ if !is_deepest => return Verdict::Split,
+            Classes::Two(both) => {
+                let kind = self.parted(attribute, corners, both, parameters.angular_threshold_deg);
+                return Verdict::Final(kind);
+            }
+            Classes::More => return Verdict::Final(Kind::Traced(Reason::Classes)),
         }
         if attribute.is_miss(attribute.outline_class(&corners[0])) {
             return if attribute.is_certainly_empty(self.pair, &self.cell) {
@@ -179,8 +186,12 @@ impl Place {
             }
         }
         self.finish(attribute, corners);
-        if let Some(mixed) = mixed(corners, |c| attribute.class(c), is_deepest) {
-            return mixed;
+        match classes(corners, |c| attribute.class(c)) {
+            Classes::One => {}
+            _ if !is_deepest => return Verdict::Split,
+            // To tell a line's class it would have to be followed to its end.
+            Classes::Two(_) => return Verdict::Final(Kind::Traced(Reason::Silhouette)),
+            Classes::More => return Verdict::Final(Kind::Traced(Reason::Classes)),
         }
         if attribute.is_told_by_outline(&corners[0]) {
             return Verdict::Final(Kind::Smooth);
@@ -219,38 +230,89 @@ impl Place {
         if is_smooth { Verdict::Final(Kind::Smooth) } else { Verdict::Split }
     }
 
-    /// The interpolated output of a line of a cell of two classes, or why it is traced.
+    /// How a final cell of two classes of outlines answers: its lines are located and interpolated if on one side of the
+    /// discontinuity, misses apart, there are samples that suffice (§2.5).
+    fn parted<A: Attribute>(
+        &self,
+        attribute: &A,
+        corners: &mut Corners<A::Output>,
+        both: [u32; 2],
+        threshold_deg: f64,
+    ) -> Kind {
+        let hit = || both.into_iter().filter(|&class| !attribute.is_miss(class));
+        let is_defined = |side: &[usize]| linear_weights(side, [A::Real::of(0.5); 4]).is_some();
+        if !hit().any(|class| is_defined(&side(attribute, corners, class))) {
+            return Kind::Traced(Reason::Silhouette);
+        }
+        self.finish(attribute, corners);
+        let mut why = None;
+        for class in hit() {
+            match usable(attribute, corners, class, threshold_deg) {
+                Ok(side) if is_defined(&side) => return Kind::TwoClasses,
+                Ok(_) => {}
+                Err(reason) => why = Some(reason),
+            }
+        }
+        Kind::Traced(why.unwrap_or(Reason::Silhouette))
+    }
+
+    /// The output of a line of a cell of two classes, interpolated from samples of its own, or why it is traced.
     pub fn of_own_class<A: Attribute>(
         &self,
         attribute: &A,
         corners: &Corners<A::Output>,
         stuv: [f64; 4],
-        angular_threshold_deg: f64,
+        threshold_deg: f64,
     ) -> Result<A::Output, Reason> {
-        let class = attribute.locate(self.line(stuv)).ok_or(Reason::Silhouette)?;
-        let usable = |bits: &usize| attribute.class(&corners[*bits]) == class;
-        let usable: Vec<usize> = (0..16).filter(usable).collect();
-        if spread_exceeds(attribute, usable.iter().map(|&bits| &corners[bits]), angular_threshold_deg) {
-            return Err(Reason::Angle);
+        let outline = attribute.locate(self.line(stuv)).ok_or(Reason::Silhouette)?;
+        let class = attribute.outline_class(&outline);
+        if attribute.is_miss(class) {
+            return Ok(outline);
         }
+        let side = usable(attribute, corners, class, threshold_deg)?;
         let fractions = self.cell.fractions(&stuv.map(A::Real::of));
-        let weights = linear_weights(&usable, fractions).ok_or(Reason::Silhouette)?;
+        let weights = linear_weights(&side, fractions).ok_or(Reason::Silhouette)?;
         let part = |(&bits, weight)| (weight, &corners[bits]);
-        let parts: Vec<_> = usable.iter().zip(weights).map(part).collect();
-        Ok(attribute.interpolate(&parts))
+        let parts: Vec<_> = side.iter().zip(weights).map(part).collect();
+        Ok(attribute.told(&outline, attribute.interpolate(&parts)))
     }
 }
 
-/// The verdict on a cell with corners of more than one class.
-fn mixed<T>(corners: &Corners<T>, class_of: impl Fn(&T) -> u32, is_deepest: bool) -> Option<Verdict> {
-    let class = class_of(&corners[0]);
-    let other = corners.iter().map(&class_of).find(|&c| c != class)?;
-    if !is_deepest {
-        // No interpolant crosses a discontinuity; smaller cells leave fewer lines on it.
-        return Some(Verdict::Split);
+/// The classes of a cell's corners.
+enum Classes {
+    One,
+    Two([u32; 2]),
+    More,
+}
+
+fn classes<T>(corners: &Corners<T>, class_of: impl Fn(&T) -> u32) -> Classes {
+    let first = class_of(&corners[0]);
+    let Some(other) = corners.iter().map(&class_of).find(|&c| c != first) else { return Classes::One };
+    let is_third = |c: u32| c != first && c != other;
+    if corners.iter().map(class_of).any(is_third) { Classes::More } else { Classes::Two([first, other]) }
+}
+
+/// The corners on one side of a discontinuity: those whose outlines are of a class.
+fn side<A: Attribute>(attribute: &A, corners: &Corners<A::Output>, class: u32) -> Vec<usize> {
+    (0..16).filter(|&bits| attribute.outline_class(&corners[bits]) == class).collect()
+}
+
+/// The corners on one side, if they are of one class in all and their directions within the threshold, or why not.
+fn usable<A: Attribute>(
+    attribute: &A,
+    corners: &Corners<A::Output>,
+    class: u32,
+    threshold_deg: f64,
+) -> Result<Vec<usize>, Reason> {
+    let side = side(attribute, corners, class);
+    let whole = |bits: usize| attribute.class(&corners[bits]);
+    if side.iter().any(|&bits| whole(bits) != whole(side[0])) {
+        return Err(Reason::Classes);
     }
-    let third = corners.iter().map(class_of).any(|c| c != class && c != other);
-    Some(Verdict::Final(if third { Kind::Traced(Reason::Classes) } else { Kind::TwoClasses }))
+    if spread_exceeds(attribute, side.iter().map(|&bits| &corners[bits]), threshold_deg) {
+        return Err(Reason::Angle);
+    }
+    Ok(side)
 }
 
 /// Quadrilinear interpolation at fractions of the cell: bilinear in (u, v) within each directional group, the four
@@ -318,8 +380,15 @@ where
     A::Output: 'a,
 {
     let directions: Vec<_> = outputs.filter_map(|o| attribute.direction(o)).collect();
-    let least_cosine = A::Real::of((attribute.angular_share() * threshold_deg).to_radians().cos());
-    directions.iter().enumerate().any(|(i, a)| directions[..i].iter().any(|b| a.dot(*b) < least_cosine))
+    let threshold = (attribute.angular_share() * threshold_deg).to_radians();
+    let cosine = |angle: f64| A::Real::of(angle.cos());
+    // All within half of it of one of them are within it of each other.
+    let near = cosine(0.5 * threshold);
+    if directions.iter().all(|a| a.dot(directions[0]) >= near) {
+        return false;
+    }
+    let least = cosine(threshold);
+    directions.iter().enumerate().any(|(i, a)| directions[..i].iter().any(|b| a.dot(*b) < least))
 }
 
 #[cfg(test)]

@@ -57,8 +57,8 @@ impl Attribute for Test {
         Sample { value: parts.iter().map(|(w, s)| w * s.value).sum(), class: parts[0].1.class }
     }
 
-    fn locate(&self, line: LinePoint) -> Option<u32> {
-        self.can_locate.then(|| (self.class)(line.stuv))
+    fn locate(&self, line: LinePoint) -> Option<Sample> {
+        self.can_locate.then(|| self.sample(line))
     }
 
     fn is_miss(&self, class: u32) -> bool {
