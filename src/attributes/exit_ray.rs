@@ -55,15 +55,16 @@ impl Through {
 }
 
 /// As [`LEVELS_SPARED`]. Samples of glass cost the most, and many of its discontinuities lie within its outline.
-const GLASS_LEVELS_SPARED: u32 = 4;
+const GLASS_LEVELS_SPARED: u32 = 5;
 
 /// How far along a ray a hit may lie from where its depth says, box units: depths of up to 1 are rounded to f32 along the
 /// axis, and rays are at most √3 times as long.
 const DEPTH_ROUNDING: f64 = 2.0 * f32::EPSILON as f64;
 
-/// How far a mirrored ray moves on what it shows, box units, by a unit turn of the normal: twice the turn, over the two and a
-/// half sides that it goes on. Measured on a waving sheet, it keeps pictures at the default threshold as true as the paper's.
-const LEVERAGE: f64 = 5.0;
+/// What of a mirrored ray's way to the farthest things counts as its lever: it turns twice as far as the normal, but much of
+/// what it shows is nearer. Measured, it keeps pictures of a waving sheet and of a bowl truer than the paper's at the paper's
+/// thresholds; all of the way would cost 7 % more operations for four fifths of the error.
+const LEVERAGE: f64 = 0.6;
 
 /// The attribute of objects that mirror or refract.
 ///
@@ -73,14 +74,17 @@ pub struct ExitRay<'a, R> {
     lines: SurfaceLines<'a>,
     optics: Optics,
     limit: u32,
+    /// How far a mirrored ray moves on what it shows by a unit turn of the normal, box units.
+    leverage: f64,
     memo: Memo<Known<R>>,
     number: PhantomData<R>,
 }
 
 impl<'a, R: Real> ExitRay<'a, R> {
-    /// The exit rays of a surface, after at most `limit` turns.
-    pub fn new(lines: SurfaceLines<'a>, optics: Optics, limit: u32) -> Self {
-        Self { lines, optics, limit, memo: Memo::default(), number: PhantomData }
+    /// The exit rays of a surface, after at most `limit` turns. Mirrored ones go on for at most `reach`, a length.
+    pub fn new(lines: SurfaceLines<'a>, optics: Optics, limit: u32, reach: f64) -> Self {
+        let leverage = LEVERAGE * reach / lines.side();
+        Self { lines, optics, limit, leverage, memo: Memo::default(), number: PhantomData }
     }
 
     /// The surface's lines.
@@ -147,11 +151,21 @@ impl<R: Real> Attribute for ExitRay<'_, R> {
         class == 0
     }
 
+    /// By its first hit, which costs little beside following the ray.
+    fn locate(&self, line: LinePoint) -> Option<Through> {
+        Some(Through::outline(Seen::along::<R>(&self.lines, line).0))
+    }
+
+    fn told(&self, outline: &Through, interpolated: Through) -> Through {
+        Through { seen: outline.seen, ..interpolated }
+    }
+
     /// The distance of the exit rays in line space (§2.3); of rays that do not leave, that of the hits' depths. A plain mirror
-    /// turns the ray itself at the interpolated place: its distance is that of the normals, see `LEVERAGE`.
+    /// turns the ray itself at the interpolated place: its distance is that of the normals,
+    /// which move what a mirror shows the more the farther it lies.
     fn distance(&self, a: &Through, b: &Through) -> f64 {
         if self.is_plain_mirror(a) && self.is_plain_mirror(b) {
-            return distance::<R>(&a.seen, &b.seen, LEVERAGE);
+            return distance::<R>(&a.seen, &b.seen, self.leverage);
         }
         match (a.exit::<R>(), b.exit::<R>()) {
             (Some(a), Some(b)) => self.lines.ray_distance(&a, &b),

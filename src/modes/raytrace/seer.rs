@@ -79,7 +79,10 @@ impl<'a, R: Real> Seer<'a, R> {
             let lines = SurfaceLines::new(&object.surface, by_direction)?;
             Some(match optics {
                 None => Tree::Seen(RiTree::new(FirstHit::new(lines), parameters)),
-                Some(optics) => Tree::Through(RiTree::new(ExitRay::new(lines, optics, limit), parameters)),
+                Some(optics) => {
+                    let exits = ExitRay::new(lines, optics, limit, world.sky.radius);
+                    Tree::Through(RiTree::new(exits, parameters))
+                }
             })
         };
         let tree = parameters.filter(|_| object.grows).and_then(grow);
@@ -136,7 +139,9 @@ impl<'a, R: Real> Seer<'a, R> {
         let far = way.length();
         let dir = way * (R::of(1.0) / far);
         let from = R::of(steady_gap(hit.error, dir.dot(hit.normal).get()));
-        self.object.surface.is_met(&Ray { origin: place, dir }, Reach { from, to: far, ..Reach::whole() })
+        self.object
+            .surface
+            .is_met(&Ray { origin: place, dir }, Reach { from, to: far, left: hit.part, ..Reach::whole() })
     }
 
     /// To ask the tree by rays whose origins lie before the object's box.
