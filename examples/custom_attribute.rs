@@ -31,6 +31,10 @@ impl Attribute for ClosestApproach {
         1 // No discontinuities: one class.
     }
 
+    fn miss(&self) -> f64 {
+        f64::INFINITY // Never asked for: no cell is empty.
+    }
+
     fn is_miss(&self, _: u32) -> bool {
         false
     }

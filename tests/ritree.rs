@@ -218,6 +218,10 @@ impl Attribute for Rough {
         1
     }
 
+    fn miss(&self) -> f64 {
+        0.0
+    }
+
     fn is_miss(&self, _: u32) -> bool {
         false
     }

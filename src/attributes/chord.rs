@@ -80,6 +80,10 @@ impl Attribute for ChordLength<'_> {
         if output.is_some() { HIT } else { MISS }
     }
 
+    fn miss(&self) -> Self::Output {
+        None
+    }
+
     fn is_miss(&self, class: u32) -> bool {
         class == MISS
     }

@@ -147,6 +147,14 @@ impl<R: Real> Attribute for ExitRay<'_, R> {
         output.seen.class ^ output.way.rotate_left(20)
     }
 
+    fn remembers(&self) -> bool {
+        true
+    }
+
+    fn miss(&self) -> Through {
+        Through::MISS
+    }
+
     fn is_miss(&self, class: u32) -> bool {
         class == 0
     }

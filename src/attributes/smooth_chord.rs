@@ -136,6 +136,14 @@ impl<R: Real> Attribute for SmoothChords<'_, R> {
         if output.is_some() { HIT } else { MISS }
     }
 
+    fn remembers(&self) -> bool {
+        true
+    }
+
+    fn miss(&self) -> Self::Output {
+        None
+    }
+
     fn is_miss(&self, class: u32) -> bool {
         class == MISS
     }

@@ -108,6 +108,14 @@ impl<R: Real> Attribute for FirstHit<'_, R> {
         output.class
     }
 
+    fn remembers(&self) -> bool {
+        true
+    }
+
+    fn miss(&self) -> Seen {
+        Seen::MISS
+    }
+
     fn is_miss(&self, class: u32) -> bool {
         class == Seen::MISS.class
     }

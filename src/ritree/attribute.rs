@@ -48,6 +48,14 @@ pub trait Attribute: Sync {
     /// Makes the outline of a line its sample, unless it is.
     fn finish(&self, _line: LinePoint, _output: &mut Self::Output) {}
 
+    /// Whether it remembers what it sampled last: corners of cells that may never be looked at are then not kept.
+    fn remembers(&self) -> bool {
+        false
+    }
+
+    /// The output of a line that misses, for cells that are [certainly empty](Self::is_certainly_empty).
+    fn miss(&self) -> Self::Output;
+
     /// The equivalence class of the patch that the sample met; outputs are interpolated within one class only. A miss
     /// is a class too. Attributes without discontinuities have one class.
     fn class(&self, output: &Self::Output) -> u32;

@@ -24,18 +24,53 @@ pub enum Verdict {
     Final(Kind),
 }
 
-/// How a final cell answers its lines. The order of these, and of the reasons, is part of the format of
-/// [kept](super::kept) trees.
+/// How a final cell answers its lines, with the corners that it needs to. The order of these, and of the reasons, is part of
+/// the format of [kept](super::kept) trees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub enum Kind {
+pub enum Kind<C = ()> {
     /// No line meets the object, proved.
     Empty,
     /// Quadrilinear interpolation of the 16 corners.
-    Smooth,
+    Smooth(C),
     /// Two classes: the line's own class is found, and its samples interpolated if they suffice.
-    TwoClasses,
+    TwoClasses(C),
     /// By tracing.
     Traced(Reason),
+}
+
+impl<C> Kind<C> {
+    /// The same kind with other corners.
+    pub fn map<D>(self, map: impl FnOnce(C) -> D) -> Kind<D> {
+        match self {
+            Self::Empty => Kind::Empty,
+            Self::Smooth(corners) => Kind::Smooth(map(corners)),
+            Self::TwoClasses(corners) => Kind::TwoClasses(map(corners)),
+            Self::Traced(reason) => Kind::Traced(reason),
+        }
+    }
+
+    /// The kind alone.
+    pub fn bare(&self) -> Kind {
+        self.as_ref().map(|_| ())
+    }
+
+    /// The corners, if they are needed.
+    pub fn corners(&self) -> Option<&C> {
+        match self {
+            Self::Smooth(corners) | Self::TwoClasses(corners) => Some(corners),
+            Self::Empty | Self::Traced(_) => None,
+        }
+    }
+
+    /// The same kind with its corners where they are.
+    pub fn as_ref(&self) -> Kind<&C> {
+        match self {
+            Self::Empty => Kind::Empty,
+            Self::Smooth(corners) => Kind::Smooth(corners),
+            Self::TwoClasses(corners) => Kind::TwoClasses(corners),
+            Self::Traced(reason) => Kind::Traced(*reason),
+        }
+    }
 }
 
 /// Why a line is traced instead of interpolated.
@@ -181,7 +216,7 @@ impl Place {
                 middle_sampled();
                 attribute.outline(line)
             });
-            if by_outlines != Verdict::Final(Kind::Smooth) {
+            if by_outlines != Verdict::Final(Kind::Smooth(())) {
                 return by_outlines;
             }
         }
@@ -194,7 +229,7 @@ impl Place {
             Classes::More => return Verdict::Final(Kind::Traced(Reason::Classes)),
         }
         if attribute.is_told_by_outline(&corners[0]) {
-            return Verdict::Final(Kind::Smooth);
+            return Verdict::Final(Kind::Smooth(()));
         }
         self.smoothness(attribute, corners, parameters, |line| {
             middle_sampled();
@@ -214,7 +249,7 @@ impl Place {
         // Smaller cells hold directions nearer to each other.
         let is_wide = spread_exceeds(attribute, corners.iter(), parameters.angular_threshold_deg);
         if self.is_deepest(parameters) {
-            return Verdict::Final(if is_wide { Kind::Traced(Reason::Angle) } else { Kind::Smooth });
+            return Verdict::Final(if is_wide { Kind::Traced(Reason::Angle) } else { Kind::Smooth(()) });
         }
         if is_wide {
             return Verdict::Split;
@@ -227,7 +262,7 @@ impl Place {
                 && attribute.distance(&near(), &exact) <= parameters.distance_threshold
         };
         let is_smooth = is_near([0.5; 4]) && attribute.second_look().is_none_or(is_near);
-        if is_smooth { Verdict::Final(Kind::Smooth) } else { Verdict::Split }
+        if is_smooth { Verdict::Final(Kind::Smooth(())) } else { Verdict::Split }
     }
 
     /// How a final cell of two classes of outlines answers: its lines are located and interpolated if on one side of the
@@ -248,7 +283,7 @@ impl Place {
         let mut why = None;
         for class in hit() {
             match usable(attribute, corners, class, threshold_deg) {
-                Ok(side) if is_defined(&side) => return Kind::TwoClasses,
+                Ok(side) if is_defined(&side) => return Kind::TwoClasses(()),
                 Ok(_) => {}
                 Err(reason) => why = Some(reason),
             }

@@ -76,21 +76,20 @@ impl<'t, A: Attribute> Descent<'t, A> {
                 self.last = Some((place, leaf));
                 return Some(self.answer_by(place, leaf, &line));
             }
-            if node.halves().is_none() {
-                match node.expand(&place, tree, cache) {
+            let side = place.side_of::<A::Real>(&line.stuv);
+            let Some(halves) = node.halves() else {
+                match node.expand(&place, side, tree, cache) {
                     Ok(()) => continue,
                     Err(corners) => return Some(self.answer_without_keeping(place, corners, &line)),
                 }
-            }
-            let Some(halves) = node.halves() else { continue };
-            let side = place.side_of::<A::Real>(&line.stuv);
+            };
             (node, place) = (&halves[side], place.half(side));
         }
     }
 
     fn answer_by(&self, place: Place, leaf: &Leaf<A::Output>, line: &LinePoint) -> (Answer<A::Output>, u32) {
         leaf.touch(self.tree.clock.load(Ordering::Relaxed));
-        (self.tree.answer(&place, leaf.kind(), leaf.corners(), line.stuv), place.depth)
+        (self.tree.answer(&place, leaf.kind(), line.stuv), place.depth)
     }
 
     /// The same answer, computed below a cell that the cache has no room to expand.
@@ -113,7 +112,7 @@ impl<'t, A: Attribute> Descent<'t, A> {
             let Step { place, corners, verdict, .. } = &self.trail[at];
             match *verdict {
                 Verdict::Final(kind) => {
-                    return (self.tree.answer(place, kind, corners, line.stuv), place.depth);
+                    return (self.tree.answer(place, kind.map(|()| corners), line.stuv), place.depth);
                 }
                 Verdict::Split => {
                     let side = place.side_of::<A::Real>(&line.stuv);

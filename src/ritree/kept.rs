@@ -11,7 +11,6 @@
 //! against what was read.
 
 use std::io::{self, Read, Write};
-use std::mem::size_of;
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -161,7 +160,7 @@ impl<'r> RecordReader<'r> {
 enum Record<C> {
     Unknown,
     Split,
-    Final(Kind, C),
+    Final(Kind<C>),
 }
 
 impl<A: Keepable> RiTree<A> {
@@ -175,7 +174,7 @@ impl<A: Keepable> RiTree<A> {
             out: &mut RecordWriter,
         ) -> io::Result<()> {
             if let Some(leaf) = node.and_then(Node::leaf) {
-                return out.put(&Record::Final(leaf.kind(), leaf.corners()));
+                return out.put(&Record::Final(leaf.kind()));
             }
             let Some(halves) = node.and_then(Node::halves) else {
                 return out.put(&Record::<&Corners<T>>::Unknown);
@@ -214,34 +213,36 @@ impl<A: Keepable> RiTree<A> {
         cache: &Cache,
         loaded: &mut Loaded,
     ) -> Result<(), Unreadable> {
-        match from.take::<Record<Corners<A::Output>>>()? {
+        match from.take::<Record<Box<Corners<A::Output>>>>()? {
             Record::Unknown => Ok(()),
             Record::Split => {
                 if place.is_deepest(&self.parameters) {
                     return Err(Unreadable::damaged("a cell of the greatest depth is split"));
                 }
                 let node = node.filter(|_| cache.reserve(node::bytes::<A::Output>(2)));
-                let halves = node.map(Node::split_unseen);
+                let halves = node.and_then(Node::split_unseen);
                 (0..2).try_for_each(|side| {
                     let half = halves.map(|halves| &halves[side]);
                     self.load_cell(half, &place.half(side), from, cache, loaded)
                 })
             }
-            Record::Final(kind, corners) => {
-                if !corners.iter().all(|output| self.attribute.is_sound(output)) {
+            Record::Final(kind) => {
+                let is_sound = |c: &Box<Corners<A::Output>>| c.iter().all(|o| self.attribute.is_sound(o));
+                if !kind.corners().is_none_or(is_sound) {
                     return Err(Unreadable::damaged("a sample is not finite"));
                 }
-                let node = node.filter(|_| cache.reserve(size_of::<Leaf<A::Output>>()));
-                // A look at what was read is none of what growing the tree takes.
-                let mut looked_at = corners.clone();
-                let mut verdict = || place.verdict(&self.attribute, &mut looked_at, &self.parameters, || ());
-                if loaded.count(node.is_some())
-                    && (place.sample(&self.attribute) != corners || verdict() != Verdict::Final(kind))
-                {
-                    return Err(Unreadable::damaged("a cell is not what this program makes of it"));
+                let node = node.filter(|_| cache.reserve(node::leaf_bytes(&kind)));
+                if loaded.count(node.is_some()) {
+                    // A look at what was read is none of what growing the tree takes.
+                    let mut sampled = place.sample(&self.attribute);
+                    let is_same = kind.corners().is_none_or(|corners| **corners == sampled);
+                    let verdict = place.verdict(&self.attribute, &mut sampled, &self.parameters, || ());
+                    if !is_same || verdict != Verdict::Final(kind.bare()) {
+                        return Err(Unreadable::damaged("a cell is not what this program makes of it"));
+                    }
                 }
                 if let Some(node) = node {
-                    node.finish(Leaf::new(kind, corners, 1));
+                    node.finish(Leaf::new(kind, 1));
                 }
                 Ok(())
             }

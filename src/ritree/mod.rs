@@ -133,17 +133,16 @@ impl<A: Attribute> RiTree<A> {
     fn answer(
         &self,
         place: &Place,
-        kind: Kind,
-        corners: &cell::Corners<A::Output>,
+        kind: Kind<&cell::Corners<A::Output>>,
         stuv: [f64; 4],
     ) -> Answer<A::Output> {
         match kind {
-            Kind::Empty => Answer::Interpolated(corners[0].clone()),
-            Kind::Smooth => {
+            Kind::Empty => Answer::Interpolated(self.attribute.miss()),
+            Kind::Smooth(corners) => {
                 let fractions = place.cell.fractions(&stuv.map(A::Real::of));
                 Answer::Interpolated(quadrilinear(&self.attribute, corners, fractions))
             }
-            Kind::TwoClasses => {
+            Kind::TwoClasses(corners) => {
                 let angle = self.parameters.angular_threshold_deg;
                 place
                     .of_own_class(&self.attribute, corners, stuv, angle)

@@ -12,36 +12,41 @@ use super::stats::TreeShape;
 
 /// A cell of the tree. A node that holds neither leaf nor halves nor corners was pruned, or never looked at.
 pub struct Node<T> {
-    halves: OnceLock<Box<[Node<T>; 2]>>,
-    leaf: OnceLock<Box<Leaf<T>>>,
+    below: OnceLock<Below<T>>,
     /// Corners sampled when the parent was split, kept until the node is expanded. The lock is for expanding only.
     corners: Mutex<Option<Box<Corners<T>>>>,
 }
 
+/// What a cell that was looked at has become.
+enum Below<T> {
+    Halves(Box<[Node<T>; 2]>),
+    Leaf(Leaf<T>),
+}
+
 impl<T> Default for Node<T> {
     fn default() -> Self {
-        Self { halves: OnceLock::new(), leaf: OnceLock::new(), corners: Mutex::new(None) }
+        Self { below: OnceLock::new(), corners: Mutex::new(None) }
     }
 }
 
-/// A final cell.
+/// A final cell, with corners where it answers by them.
 pub struct Leaf<T> {
-    corners: Corners<T>,
-    kind: Kind,
+    kind: Kind<Box<Corners<T>>>,
     stamp: AtomicU32,
 }
 
 impl<T> Leaf<T> {
-    pub fn new(kind: Kind, corners: Corners<T>, stamp: u32) -> Self {
-        Self { corners, kind, stamp: AtomicU32::new(stamp) }
+    pub fn new(kind: Kind<Box<Corners<T>>>, stamp: u32) -> Self {
+        Self { kind, stamp: AtomicU32::new(stamp) }
     }
 
-    pub fn kind(&self) -> Kind {
-        self.kind
+    pub fn kind(&self) -> Kind<&Corners<T>> {
+        self.kind.as_ref().map(|corners| &**corners)
     }
 
-    pub fn corners(&self) -> &Corners<T> {
-        &self.corners
+    /// Bytes beside its node.
+    fn bytes(&self) -> usize {
+        leaf_bytes(&self.kind)
     }
 
     /// Marks the leaf as used at `time`. Written only when it changes, so that threads do not fight for the line.
@@ -52,28 +57,50 @@ impl<T> Leaf<T> {
     }
 }
 
+/// The bytes of a leaf beside its node.
+pub fn leaf_bytes<T>(kind: &Kind<Box<Corners<T>>>) -> usize {
+    kind.corners().map_or(0, |_| size_of::<Corners<T>>())
+}
+
 /// The bytes of `n` nodes.
 pub fn bytes<T>(n: usize) -> usize {
     n * size_of::<Node<T>>()
 }
 
+impl<T> Below<T> {
+    /// Bytes beside the node whose it is.
+    fn bytes(&self) -> usize {
+        match self {
+            Self::Halves(_) => bytes::<T>(2),
+            Self::Leaf(leaf) => leaf.bytes(),
+        }
+    }
+}
+
 impl<T: Clone + Send + Sync> Node<T> {
     pub fn leaf(&self) -> Option<&Leaf<T>> {
-        self.leaf.get().map(|leaf| &**leaf)
+        match self.below.get() {
+            Some(Below::Leaf(leaf)) => Some(leaf),
+            _ => None,
+        }
     }
 
     pub fn halves(&self) -> Option<&[Self; 2]> {
-        self.halves.get().map(|halves| &**halves)
+        match self.below.get() {
+            Some(Below::Halves(halves)) => Some(halves),
+            _ => None,
+        }
     }
 
     /// Splits a node that is known to be, without a look. The cache is to have room for the halves.
-    pub fn split_unseen(&self) -> &[Self; 2] {
-        self.halves.get_or_init(Box::default)
+    pub fn split_unseen(&self) -> Option<&[Self; 2]> {
+        self.below.get_or_init(|| Below::Halves(Box::default()));
+        self.halves()
     }
 
     /// Makes a node final by a leaf that is known. The cache is to have room for it.
     pub fn finish(&self, leaf: Leaf<T>) {
-        let _ = self.leaf.set(Box::new(leaf));
+        let _ = self.below.set(Below::Leaf(leaf));
     }
 
     fn lock(&self) -> MutexGuard<'_, Option<Box<Corners<T>>>> {
@@ -81,11 +108,12 @@ impl<T: Clone + Send + Sync> Node<T> {
         self.corners.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Gives the node its leaf or its halves, as its cell says. If the cache has no room, the node stays as it is and its
-    /// corners are the error (or `None` if it has none).
+    /// Gives the node its leaf or its halves, as its cell says; the next to be looked at is the half on the `side` that is asked
+    /// for. If the cache has no room, the node stays as it is and its corners are the error (or `None` if it has none).
     pub fn expand<A>(
         &self,
         place: &Place,
+        side: usize,
         tree: &RiTree<A>,
         cache: &Cache,
     ) -> Result<(), Option<Box<Corners<T>>>>
@@ -93,32 +121,37 @@ impl<T: Clone + Send + Sync> Node<T> {
         A: Attribute<Output = T>,
     {
         let mut guard = self.lock();
-        if self.leaf.get().is_some() || self.halves.get().is_some() {
+        if self.below.get().is_some() {
             return Ok(());
         }
         let held = if guard.is_some() { size_of::<Corners<T>>() } else { 0 };
+        // The other half's corners wait, too, unless they are sampled again sooner than kept.
+        let waits = |half: usize| half == side || !tree.attribute.remembers();
+        let of_halves = bytes::<T>(2) + (0..2).filter(|&half| waits(half)).count() * size_of::<Corners<T>>();
         // Room for the larger outcome is taken first; what is not needed is given back.
-        let largest = (bytes::<T>(2) + 2 * size_of::<Corners<T>>()).max(size_of::<Leaf<T>>());
-        if !cache.reserve(largest) {
+        if !cache.reserve(of_halves) {
             return Err(guard.clone());
         }
         let mut corners = guard.take().unwrap_or_else(|| Box::new(tree.sample_corners(place)));
-        let kept = match tree.verdict(place, &mut corners) {
+        let (below, kept) = match tree.verdict(place, &mut corners) {
             Verdict::Final(kind) => {
-                let now = tree.clock.load(Ordering::Relaxed);
-                let _ = self.leaf.set(Box::new(Leaf::new(kind, *corners, now)));
-                size_of::<Leaf<T>>()
+                let kind = kind.map(|()| corners);
+                let kept = leaf_bytes(&kind);
+                (Below::Leaf(Leaf::new(kind, tree.clock.load(Ordering::Relaxed))), kept)
             }
             Verdict::Split => {
-                let halves = tree
-                    .split(place, &corners)
-                    .map(|corners| Self { corners: Mutex::new(Some(Box::new(corners))), ..Self::default() });
-                let _ = self.halves.set(Box::new(halves));
-                bytes::<T>(2) + 2 * size_of::<Corners<T>>()
+                let mut half = 0;
+                let halves = tree.split(place, &corners).map(|corners| {
+                    let waiting = waits(half).then(|| Box::new(corners));
+                    half += 1;
+                    Self { corners: Mutex::new(waiting), ..Self::default() }
+                });
+                (Below::Halves(Box::new(halves)), of_halves)
             }
         };
+        let _ = self.below.set(below);
         tree.counters.expanded();
-        cache.release(largest - kept + held);
+        cache.release(of_halves - kept + held);
         Ok(())
     }
 
@@ -126,7 +159,7 @@ impl<T: Clone + Send + Sync> Node<T> {
     pub fn collect_stamps(&self, stamps: &mut Vec<(u32, usize)>) -> Option<u32> {
         if let Some(leaf) = self.leaf() {
             let stamp = leaf.stamp.load(Ordering::Relaxed);
-            stamps.push((stamp, size_of::<Leaf<T>>()));
+            stamps.push((stamp, leaf.bytes()));
             return Some(stamp);
         }
         let newest = self.halves()?.iter().filter_map(|half| half.collect_stamps(stamps)).max();
@@ -139,22 +172,16 @@ impl<T: Clone + Send + Sync> Node<T> {
         if self.corners.get_mut().unwrap_or_else(PoisonError::into_inner).take().is_some() {
             cache.release(size_of::<Corners<T>>());
         }
-        if let Some(leaf) = self.leaf.get() {
-            if leaf.stamp.load(Ordering::Relaxed) >= oldest_kept {
-                return true;
+        let is_needed = match self.below.get_mut() {
+            None => false,
+            Some(Below::Leaf(leaf)) => *leaf.stamp.get_mut() >= oldest_kept,
+            Some(Below::Halves(halves)) => {
+                let [lower, upper] = halves.each_mut().map(|half| half.prune(oldest_kept, cache));
+                lower | upper
             }
-            self.leaf.take();
-            cache.release(size_of::<Leaf<T>>());
-            return false;
-        }
-        let Some(halves) = self.halves.get_mut() else { return false };
-        let mut is_needed = false;
-        for half in halves.iter_mut() {
-            is_needed |= half.prune(oldest_kept, cache);
-        }
-        if !is_needed {
-            self.halves.take();
-            cache.release(bytes::<T>(2));
+        };
+        if !is_needed && let Some(below) = self.below.take() {
+            cache.release(below.bytes());
         }
         is_needed
     }
@@ -162,7 +189,7 @@ impl<T: Clone + Send + Sync> Node<T> {
     pub fn add_to(&self, depth: usize, shape: &mut TreeShape) {
         shape.nodes += 1;
         if let Some(leaf) = self.leaf() {
-            shape.add_leaf(depth, leaf.kind());
+            shape.add_leaf(depth, leaf.kind().bare());
         }
         self.halves().into_iter().flatten().for_each(|half| half.add_to(depth + 1, shape));
     }
@@ -182,17 +209,12 @@ impl<T: Clone + Send + Sync> Node<T> {
             corners
         };
         if let Some(leaf) = self.leaf() {
-            assert!(
-                self.halves().is_none() && self.lock().is_none(),
-                "a final leaf holds only its own corners"
-            );
-            assert_eq!(
-                finished(&leaf.corners),
-                finished(&sampled),
-                "stored corners are their lines' samples"
-            );
-            assert_eq!(Verdict::Final(leaf.kind), verdict, "a final leaf is final");
-            return size_of::<Leaf<T>>();
+            assert!(self.lock().is_none(), "a final leaf holds only its own corners");
+            if let Some(corners) = leaf.kind.corners() {
+                assert_eq!(finished(corners), finished(&sampled), "stored corners are their lines' samples");
+            }
+            assert_eq!(Verdict::Final(leaf.kind.bare()), verdict, "a final leaf is final");
+            return leaf.bytes();
         }
         if let Some(halves) = self.halves() {
             assert!(self.lock().is_none(), "a split node keeps no corners");

@@ -97,9 +97,9 @@ impl TreeShape {
         self.count_leaf(
             depth,
             match kind {
-                Kind::Smooth => |shape| &mut shape.smooth_leaves,
+                Kind::Smooth(()) => |shape| &mut shape.smooth_leaves,
                 Kind::Empty => |shape| &mut shape.empty_leaves,
-                Kind::TwoClasses | Kind::Traced(_) => |shape| &mut shape.traced_leaves,
+                Kind::TwoClasses(()) | Kind::Traced(_) => |shape| &mut shape.traced_leaves,
             },
         );
     }

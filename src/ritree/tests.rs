@@ -61,6 +61,10 @@ impl Attribute for Test {
         self.can_locate.then(|| self.sample(line))
     }
 
+    fn miss(&self) -> Sample {
+        Sample { value: 0.0, class: MISS }
+    }
+
     fn is_miss(&self, class: u32) -> bool {
         class == MISS
     }
@@ -154,6 +158,10 @@ impl Attribute for Asked {
 
     fn interpolate(&self, parts: &[(f64, &Sample)]) -> Sample {
         self.0.interpolate(parts)
+    }
+
+    fn miss(&self) -> Sample {
+        Sample { value: 0.0, class: MISS }
     }
 
     fn is_miss(&self, class: u32) -> bool {

@@ -92,6 +92,10 @@ impl Attribute for Perturbed<'_> {
         self.0.class(output)
     }
 
+    fn miss(&self) -> Self::Output {
+        self.0.miss()
+    }
+
     fn is_miss(&self, class: u32) -> bool {
         self.0.is_miss(class)
     }
