@@ -372,7 +372,9 @@ impl<R: Real> LightPath<'_, '_, R> {
             if material.specular > 0.0 {
                 let mirrored = reflected(ray.dir, sight.normal);
                 let towards = mirrored.dot(dir).max(R::of(0.0));
-                light = light + lamp * (towards.powf(material.shininess) * R::of(material.specular));
+                if towards.get() > self.seers[object].highlight_from {
+                    light = light + lamp * (towards.powf(material.shininess) * R::of(material.specular));
+                }
             }
         }
         light

@@ -14,6 +14,9 @@ use crate::scene::trace::{Material, Object, World};
 use crate::surface::optics::{Optics, follow};
 use crate::surface::{Hit, Reach, steady_gap};
 
+/// Highlights below this share of their light are not seen: a third of the least step of eight bits, in the dark.
+const LEAST_HIGHLIGHT: f64 = 1e-4;
+
 /// A place where an object is seen.
 #[derive(Clone, Copy, Debug)]
 pub struct Sight<R> {
@@ -61,6 +64,8 @@ pub struct Seer<'a, R: Real> {
     /// Where it hides each light, for objects with a tree.
     shadows: Vec<LightMap<'a>>,
     lights: Vec<DVec3>,
+    /// The cosine to a light's mirrored ray above which a highlight is seen.
+    pub highlight_from: f64,
     optics: Option<Optics>,
     limit: u32,
     tree: Option<Tree<'a, R>>,
@@ -90,7 +95,8 @@ impl<'a, R: Real> Seer<'a, R> {
         let map = |&light: &DVec3| LightMap::new(&object.surface, light, threshold);
         let shadows = if tree.is_some() { lights.iter().map(map).collect() } else { Vec::new() };
         let bounds = object.surface.bounds();
-        Self { object, bounds, shadows, lights, optics, limit, tree }
+        let highlight_from = LEAST_HIGHLIGHT.powf(1.0 / object.material.shininess);
+        Self { object, bounds, shadows, lights, highlight_from, optics, limit, tree }
     }
 
     /// Its material.
