@@ -50,7 +50,8 @@ impl Through {
     /// The exit ray. `None` if the ray does not leave.
     pub fn exit<R: Real>(&self) -> Option<Ray<R>> {
         let leaves = self.exit_dir != [0.0; 3];
-        leaves.then(|| Ray { origin: vector(self.exit_point), dir: vector(self.exit_dir) })
+        // As f32 tells it the direction is not of unit length, and places along the ray would not be where they are.
+        leaves.then(|| Ray { origin: vector(self.exit_point), dir: vector(self.exit_dir).normalized() })
     }
 }
 
@@ -244,10 +245,10 @@ impl<R: Real> ExitRay<'_, R> {
         self.optics == Optics::Mirror && (output.turns() == 1 || !output.is_finished())
     }
 
-    /// The exit ray of an interpolated output for the ray that asked, which meets the object at `place`.
-    pub fn exit_of(&self, output: &Through, ray: &Ray<R>, place: Vec3<R>) -> Option<Ray<R>> {
+    /// The exit ray of an interpolated output for the ray that asked, which meets the object at `place` with this unit normal.
+    pub fn exit_of(&self, output: &Through, ray: &Ray<R>, place: Vec3<R>, normal: Vec3<R>) -> Option<Ray<R>> {
         if self.is_plain_mirror(output) {
-            return Some(Ray { origin: place, dir: reflected(ray.dir, vector(output.seen.normal)) });
+            return Some(Ray { origin: place, dir: reflected(ray.dir, normal) });
         }
         output.exit()
     }

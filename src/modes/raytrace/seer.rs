@@ -226,15 +226,16 @@ impl<R: Real> Asker<'_, '_, R> {
                 let lines = descent.tree().attribute().lines();
                 let point = lines.point(ray);
                 let seen = answer(descent.query(point, cache))?;
-                Ok(seen.and_then(|seen| sight(lines, ray, point, &seen, |_| None)))
+                Ok(seen.and_then(|seen| sight(lines, ray, point, &seen, |_, _| None)))
             }
             Self::Through(descent) => {
                 let exits = descent.tree().attribute();
                 let point = exits.lines().point(ray);
                 let through = answer(descent.query(point, cache))?;
                 Ok(through.and_then(|through| {
-                    let turned =
-                        |place| exits.exit_of(&through, ray, place).map(|exit| (exit, through.turns()));
+                    let turned = |place, normal| {
+                        exits.exit_of(&through, ray, place, normal).map(|exit| (exit, through.turns()))
+                    };
                     sight(exits.lines(), ray, point, &through.seen, turned)
                 }))
             }
@@ -256,14 +257,15 @@ fn sight<R: Real>(
     ray: &Ray<R>,
     point: LinePoint,
     seen: &Seen,
-    turned: impl FnOnce(Vec3<R>) -> Option<(Ray<R>, u32)>,
+    turned: impl FnOnce(Vec3<R>, Vec3<R>) -> Option<(Ray<R>, u32)>,
 ) -> Option<Sight<R>> {
     if *seen == Seen::MISS || !is_in_range(&point.stuv) {
         return None;
     }
     let t = lines.distance_to(R::of(seen.depth.into()), ray, point.pair);
     let place = ray.at(t);
-    let normal = vector(seen.normal);
+    // As f32 tells it, it is not of unit length, nor would be what is mirrored at it.
+    let normal = vector(seen.normal).normalized();
     let normal = if seen.enters() { normal } else { -normal };
-    Some(Sight { t, place, normal, known: Known::Told(turned(place)) })
+    Some(Sight { t, place, normal, known: Known::Told(turned(place, normal)) })
 }

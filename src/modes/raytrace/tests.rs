@@ -53,6 +53,29 @@ fn pictures_are_the_same_bits_for_any_cache_and_number_of_threads() {
 }
 
 #[test]
+fn what_trees_tell_has_directions_of_unit_length() {
+    let mut turned = 0;
+    for world in worlds() {
+        let Tracing::RiTree(settings) = trees(0.05) else { unreachable!() };
+        let cache = Cache::new(settings.cache_bytes);
+        for object in world.objects.iter().filter(|object| object.grows) {
+            let seer = Seer::<f64>::new(object, &world, Some(settings.parameters));
+            let mut asker = seer.asker();
+            for (column, row) in (0..SIZE.0).flat_map(|x| (0..SIZE.1).map(move |y| (x, y))) {
+                let ray = world.cameras[0].ray(SIZE, f64::from(column), f64::from(row));
+                let Ok(Some(sight)) = asker.ask(&ray, &cache) else { continue };
+                assert!((sight.normal.length() - 1.0).abs() < 1e-14, "{:?}", sight.normal);
+                if let Some((on, _)) = seer.turned(&ray, &sight) {
+                    assert!((on.dir.length() - 1.0).abs() < 1e-14, "{:?}", on.dir);
+                    turned += 1;
+                }
+            }
+        }
+    }
+    assert!(turned > 100, "{turned}");
+}
+
+#[test]
 fn counting_operations_changes_no_colour() {
     let world = &worlds()[0];
     for tracing in [Tracing::Exact, trees(0.05)] {
