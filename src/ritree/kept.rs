@@ -227,8 +227,8 @@ impl<A: Keepable> RiTree<A> {
                 })
             }
             Record::Final(kind) => {
-                let is_sound = |c: &Box<Corners<A::Output>>| c.iter().all(|o| self.attribute.is_sound(o));
-                if !kind.corners().is_none_or(is_sound) {
+                let mut kept = kind.corners().into_iter().flat_map(|corners| corners.iter());
+                if !kept.all(|output| self.attribute.is_sound(output)) {
                     return Err(Unreadable::damaged("a sample is not finite"));
                 }
                 let node = node.filter(|_| cache.reserve(node::leaf_bytes(&kind)));

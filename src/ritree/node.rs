@@ -140,13 +140,12 @@ impl<T: Clone + Send + Sync> Node<T> {
                 (Below::Leaf(Leaf::new(kind, tree.clock.load(Ordering::Relaxed))), kept)
             }
             Verdict::Split => {
-                let mut half = 0;
-                let halves = tree.split(place, &corners).map(|corners| {
+                let [lower, upper] = tree.split(place, &corners);
+                let half = |half: usize, corners: Corners<T>| {
                     let waiting = waits(half).then(|| Box::new(corners));
-                    half += 1;
                     Self { corners: Mutex::new(waiting), ..Self::default() }
-                });
-                (Below::Halves(Box::new(halves)), of_halves)
+                };
+                (Below::Halves(Box::new([half(0, lower), half(1, upper)])), of_halves)
             }
         };
         let _ = self.below.set(below);
