@@ -4,10 +4,10 @@ use std::marker::PhantomData;
 
 use super::lines::SurfaceLines;
 use super::memo::Memo;
-use super::surface::{LEVELS_SPARED, SECOND_LOOK, Seen, blend, distance, f32s, vector};
+use super::surface::{SAMPLING, Seen, blend, distance, f32s, vector};
 use crate::geometry::{Ray, Real, Vec3};
 use crate::linespace::{Cell, LinePoint, PlanePair};
-use crate::ritree::Attribute;
+use crate::ritree::{Attribute, Sampling};
 use crate::surface::optics::{Optics, follow, reflected};
 use crate::surface::{Hit, Reach};
 
@@ -55,8 +55,8 @@ impl Through {
     }
 }
 
-/// As [`LEVELS_SPARED`]. Samples of glass cost the most, and many of its discontinuities lie within its outline.
-const GLASS_LEVELS_SPARED: u32 = 5;
+/// See [`Sampling::levels_spared`]: samples of glass cost the most, and many of its discontinuities lie within its outline.
+const GLASS_LEVELS_SPARED: u32 = 6;
 
 /// How far along a ray a hit may lie from where its depth says, box units: depths of up to 1 are rounded to f32 along the
 /// axis, and rays are at most √3 times as long.
@@ -65,7 +65,7 @@ const DEPTH_ROUNDING: f64 = 2.0 * f32::EPSILON as f64;
 /// What of a mirrored ray's way to the farthest things counts as its lever: it turns twice as far as the normal, but much of
 /// what it shows is nearer. Measured, it keeps pictures of a waving sheet and of a bowl truer than the paper's at the paper's
 /// thresholds; all of the way would cost 7 % more operations for four fifths of the error.
-const LEVERAGE: f64 = 0.6;
+const LEVERAGE: f64 = 0.3;
 
 /// The attribute of objects that mirror or refract.
 ///
@@ -117,10 +117,10 @@ impl<R: Real> Attribute for ExitRay<'_, R> {
         output.seen.class
     }
 
-    fn levels_spared(&self) -> u32 {
+    fn sampling(&self) -> Sampling {
         match self.optics {
-            Optics::Mirror => LEVELS_SPARED,
-            Optics::Glass { .. } => GLASS_LEVELS_SPARED,
+            Optics::Mirror => SAMPLING,
+            Optics::Glass { .. } => Sampling { levels_spared: GLASS_LEVELS_SPARED, ..SAMPLING },
         }
     }
 
@@ -148,10 +148,6 @@ impl<R: Real> Attribute for ExitRay<'_, R> {
         output.seen.class ^ output.way.rotate_left(20)
     }
 
-    fn remembers(&self) -> bool {
-        true
-    }
-
     fn miss(&self) -> Through {
         Through::MISS
     }
@@ -161,8 +157,12 @@ impl<R: Real> Attribute for ExitRay<'_, R> {
     }
 
     /// By its first hit, which costs little beside following the ray.
-    fn locate(&self, line: LinePoint) -> Option<Through> {
-        Some(Through::outline(Seen::along::<R>(&self.lines, line).0))
+    fn locates(&self) -> bool {
+        true
+    }
+
+    fn locate(&self, line: LinePoint) -> Through {
+        Through::outline(Seen::along::<R>(&self.lines, line).0)
     }
 
     fn told(&self, outline: &Through, interpolated: Through) -> Through {
@@ -210,10 +210,6 @@ impl<R: Real> Attribute for ExitRay<'_, R> {
     /// A mirrored ray turns twice as far as the normal.
     fn angular_share(&self) -> f64 {
         if self.optics == Optics::Mirror { 0.5 } else { 1.0 }
-    }
-
-    fn second_look(&self) -> Option<[f64; 4]> {
-        Some(SECOND_LOOK)
     }
 
     fn is_certainly_empty(&self, pair: PlanePair, cell: &Cell) -> bool {

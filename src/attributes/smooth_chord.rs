@@ -3,10 +3,10 @@
 
 use super::lines::{ByDirection, SurfaceLines};
 use super::memo::Memo;
-use super::surface::{f32s, vector};
+use super::surface::{SAMPLING, f32s, vector};
 use crate::geometry::{Ray, Real, Vec3};
 use crate::linespace::{Cell, LinePoint, PlanePair};
-use crate::ritree::Attribute;
+use crate::ritree::{Attribute, Sampling};
 use crate::surface::{Crossing, Hit, Reach, Surface};
 
 /// A chord, as samples hold it: its length with the normal where it begins, whose turning tells how much the surface bends
@@ -20,7 +20,7 @@ pub struct SmoothChord {
     pub normal: [f32; 3],
 }
 
-/// See [`Attribute::levels_spared`]: two intersections are soon found, and what is interpolated beyond an outline is off by
+/// See [`Sampling::levels_spared`]: two intersections are soon found, and what is interpolated beyond an outline is off by
 /// more than all the rest. With six levels fewer a picture of the paper's size takes the fewest operations.
 const LEVELS_SPARED: u32 = 6;
 
@@ -128,16 +128,12 @@ impl<R: Real> Attribute for SmoothChords<'_, R> {
         });
     }
 
-    fn levels_spared(&self) -> u32 {
-        LEVELS_SPARED
+    fn sampling(&self) -> Sampling {
+        Sampling { levels_spared: LEVELS_SPARED, ..SAMPLING }
     }
 
     fn class(&self, output: &Self::Output) -> u32 {
         if output.is_some() { HIT } else { MISS }
-    }
-
-    fn remembers(&self) -> bool {
-        true
     }
 
     fn miss(&self) -> Self::Output {

@@ -6,7 +6,7 @@ use super::lines::SurfaceLines;
 use super::memo::Memo;
 use crate::geometry::{Real, Vec3};
 use crate::linespace::{Cell, LinePoint, PlanePair};
-use crate::ritree::Attribute;
+use crate::ritree::{Attribute, Sampling, Scheme};
 use crate::surface::{Hit, Reach};
 
 /// What is known of a line's first hit, as samples hold it: {normal, point} of the paper, the point by how far along the
@@ -60,11 +60,9 @@ pub(super) fn blend<'a, R: Real>(parts: impl Iterator<Item = (R, &'a [f32; 3])>)
     parts.fold(Vec3::default(), |sum, (weight, v)| sum + vector(*v) * weight)
 }
 
-/// See [`Attribute::levels_spared`]: cells along outlines that are twice to four times as large, in the paper's pictures.
-pub(super) const LEVELS_SPARED: u32 = 2;
-
-/// See [`Attribute::second_look`]: off the middle along every side, differently far.
-pub(super) const SECOND_LOOK: [f64; 4] = [0.2, 0.6, 0.45, 0.35];
+/// How cells of surfaces are sampled. Along outlines they are a half larger than elsewhere, in the paper's pictures.
+pub(super) const SAMPLING: Sampling =
+    Sampling { levels_per_look: 4, levels_spared: 2, remembers: true, scheme: Scheme::Simplicial };
 
 /// How far two hits of one line are apart, box units, where a turn of the normal counts `leverage` times.
 pub(super) fn distance<R: Real>(a: &Seen, b: &Seen, leverage: f64) -> f64 {
@@ -100,16 +98,12 @@ impl<R: Real> Attribute for FirstHit<'_, R> {
         self.memo.recall(line, || Seen::along::<R>(&self.lines, line).0)
     }
 
-    fn levels_spared(&self) -> u32 {
-        LEVELS_SPARED
+    fn sampling(&self) -> Sampling {
+        SAMPLING
     }
 
     fn class(&self, output: &Seen) -> u32 {
         output.class
-    }
-
-    fn remembers(&self) -> bool {
-        true
     }
 
     fn miss(&self) -> Seen {
@@ -135,10 +129,6 @@ impl<R: Real> Attribute for FirstHit<'_, R> {
 
     fn direction(&self, output: &Seen) -> Option<Vec3<R>> {
         (output.class != Seen::MISS.class).then(|| vector(output.normal))
-    }
-
-    fn second_look(&self) -> Option<[f64; 4]> {
-        Some(SECOND_LOOK)
     }
 
     fn is_certainly_empty(&self, pair: PlanePair, cell: &Cell) -> bool {

@@ -3,6 +3,38 @@
 use crate::geometry::{Real, Vec3};
 use crate::linespace::{Cell, LinePoint, PlanePair};
 
+/// How lines are interpolated between the corners of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scheme {
+    /// By all 16, linearly in each of the four coordinates (§2.4).
+    Quadrilinear,
+    /// By the 5 of the simplex that holds the line, linearly: a third of the operations. What bends one way along one side and
+    /// the other way along another is told worse, all else better. Beside a discontinuity, too, lines are interpolated that a
+    /// simplex of one class holds.
+    Simplicial,
+}
+
+/// How cells are sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sampling {
+    /// Cells are looked at on every so manieth level from the greatest depth up, and on those [spared](Self::levels_spared); on
+    /// the levels between they are split unseen. Four levels halve all sides of a cell.
+    pub levels_per_look: u32,
+    /// How many levels before the greatest depth cells end that hold a discontinuity, or all of whose corners miss: their lines
+    /// are traced, and where few lines ask for a cell that is less than to sample it.
+    pub levels_spared: u32,
+    /// Whether the attribute remembers what it sampled last: no corners are then kept for cells that may never be looked at.
+    pub remembers: bool,
+    /// How lines are interpolated.
+    pub scheme: Scheme,
+}
+
+impl Sampling {
+    /// The paper's way (§2.3, §2.4).
+    pub const PAPER: Self =
+        Self { levels_per_look: 1, levels_spared: 0, remembers: false, scheme: Scheme::Quadrilinear };
+}
+
 /// A geometric attribute of lines near one object: what an RI-tree samples and interpolates.
 ///
 /// The tree knows lines and cells, the attribute knows the object. Every method must be a pure function of its
@@ -28,10 +60,9 @@ pub trait Attribute: Sync {
         self.class(output)
     }
 
-    /// How many levels before the greatest depth cells end that hold a discontinuity, or all of whose corners miss: their lines
-    /// are traced, and where few lines ask for a cell that is less than to sample it. 0 is the paper's rule.
-    fn levels_spared(&self) -> u32 {
-        0
+    /// How cells are sampled.
+    fn sampling(&self) -> Sampling {
+        Sampling::PAPER
     }
 
     /// The outline within an output, where outlines have [distances](Self::distance) and [directions](Self::direction) of their
@@ -48,11 +79,6 @@ pub trait Attribute: Sync {
     /// Makes the outline of a line its sample, unless it is.
     fn finish(&self, _line: LinePoint, _output: &mut Self::Output) {}
 
-    /// Whether it remembers what it sampled last: corners of cells that may never be looked at are then not kept.
-    fn remembers(&self) -> bool {
-        false
-    }
-
     /// The output of a line that misses, for cells that are [certainly empty](Self::is_certainly_empty).
     fn miss(&self) -> Self::Output;
 
@@ -67,10 +93,15 @@ pub trait Attribute: Sync {
     /// more usable samples are extrapolated.
     fn interpolate(&self, parts: &[(Self::Real, &Self::Output)]) -> Self::Output;
 
-    /// The outline of a line, by the one intersection test of §2.5, asked when a cell holds exactly two classes of them. `None`
-    /// if the test costs as much as tracing the line, which is then done instead.
-    fn locate(&self, _line: LinePoint) -> Option<Self::Output> {
-        None
+    /// Whether lines of a cell with exactly two classes of outlines are [located](Self::locate), by the one intersection test of
+    /// §2.5. If not, that test costs as much as tracing the line, which is then done instead.
+    fn locates(&self) -> bool {
+        false
+    }
+
+    /// The outline of a line that is asked for.
+    fn locate(&self, line: LinePoint) -> Self::Output {
+        self.outline(line)
     }
 
     /// The output of a line that was [located](Self::locate) and interpolated from samples of its class: what its outline
@@ -90,12 +121,6 @@ pub trait Attribute: Sync {
     /// What of the angular threshold directions may differ by: less than all of it where what is told turns farther than they do.
     fn angular_share(&self) -> f64 {
         1.0
-    }
-
-    /// Where in a cell, from 0 to 1 along each side, a second line must pass the midpoint's test. Of what bends one way along one
-    /// side and the other way along another the midpoint knows nothing. `None` is the paper's rule.
-    fn second_look(&self) -> Option<[f64; 4]> {
-        None
     }
 
     /// Whether a line and its reverse have the same output, so that +X and −X can share a tree.

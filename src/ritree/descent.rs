@@ -8,7 +8,8 @@
 use std::sync::atomic::Ordering;
 
 use super::attribute::Attribute;
-use super::cell::{Corners, Place, Verdict};
+use super::cell::{Place, Verdict};
+use super::interpolant::Corners;
 use super::node::Leaf;
 use super::{Answer, Cache, Reason, RiTree};
 use crate::linespace::{LinePoint, is_in_range};
@@ -25,10 +26,10 @@ pub struct Descent<'t, A: Attribute> {
 /// A cell that is kept nowhere else.
 struct Step<T> {
     place: Place,
-    corners: Corners<T>,
+    /// Its corners and what they say. `None` if it is split unseen.
+    seen: Option<(Corners<T>, Verdict)>,
     /// The corners of the other half of the cell above, which cost nothing more.
     beside: Option<Corners<T>>,
-    verdict: Verdict,
 }
 
 impl<'t, A: Attribute> Descent<'t, A> {
@@ -78,7 +79,7 @@ impl<'t, A: Attribute> Descent<'t, A> {
             }
             let side = place.side_of::<A::Real>(&line.stuv);
             let Some(halves) = node.halves() else {
-                match node.expand(&place, side, tree, cache) {
+                match node.expand(&place, tree, cache) {
                     Ok(()) => continue,
                     Err(corners) => return Some(self.answer_without_keeping(place, corners, &line)),
                 }
@@ -100,8 +101,7 @@ impl<'t, A: Attribute> Descent<'t, A> {
         line: &LinePoint,
     ) -> (Answer<A::Output>, u32) {
         self.trail.clear();
-        let corners = corners.map_or_else(|| self.tree.sample_corners(&start), |corners| *corners);
-        self.push(start, corners, None);
+        self.push(start, corners.map(|corners| *corners), None);
         self.answer_along_trail(line)
     }
 
@@ -109,17 +109,13 @@ impl<'t, A: Attribute> Descent<'t, A> {
     fn answer_along_trail(&mut self, line: &LinePoint) -> (Answer<A::Output>, u32) {
         let mut at = self.trail.iter().rposition(|step| step.place.holds(line)).unwrap_or(0);
         loop {
-            let Step { place, corners, verdict, .. } = &self.trail[at];
-            match *verdict {
-                Verdict::Final(kind) => {
-                    return (self.tree.answer(place, kind.map(|()| corners), line.stuv), place.depth);
-                }
-                Verdict::Split => {
-                    let side = place.side_of::<A::Real>(&line.stuv);
-                    self.turn_to(at, side);
-                    at += 1;
-                }
+            let Step { place, seen, .. } = &self.trail[at];
+            if let Some((corners, Verdict::Final(kind))) = seen {
+                return (self.tree.answer(place, kind.map(|()| corners), line.stuv), place.depth);
             }
+            let side = place.side_of::<A::Real>(&line.stuv);
+            self.turn_to(at, side);
+            at += 1;
         }
     }
 
@@ -127,22 +123,33 @@ impl<'t, A: Attribute> Descent<'t, A> {
     fn turn_to(&mut self, at: usize, side: usize) {
         let next = if self.trail.len() > at + 1 { Some(self.trail.swap_remove(at + 1)) } else { None };
         self.trail.truncate(at + 1);
-        let Step { place, corners, .. } = &self.trail[at];
+        let Step { place, seen, .. } = &self.trail[at];
         let half = place.half(side);
-        match next {
+        match (next, seen) {
             // The way led to the other half, whose corners are there.
-            Some(Step { corners, beside: Some(wanted), .. }) => self.push(half, wanted, Some(corners)),
-            _ => {
-                let [lower, upper] = self.tree.split(place, corners);
-                self.tree.counters.transient();
-                let (wanted, other) = if side == 0 { (lower, upper) } else { (upper, lower) };
-                self.push(half, wanted, Some(other));
+            (Some(Step { seen: Some((corners, _)), beside: Some(wanted), .. }), _) => {
+                self.push(half, Some(wanted), Some(corners));
+                return;
             }
+            (_, Some((corners, _))) if !self.tree.attribute.sampling().remembers => {
+                let [lower, upper] = self.tree.split(place, corners);
+                let (wanted, other) = if side == 0 { (lower, upper) } else { (upper, lower) };
+                self.push(half, Some(wanted), Some(other));
+            }
+            _ => self.push(half, None, None),
         }
+        self.tree.counters.transient();
     }
 
-    fn push(&mut self, place: Place, mut corners: Corners<A::Output>, beside: Option<Corners<A::Output>>) {
-        let verdict = self.tree.verdict(&place, &mut corners);
-        self.trail.push(Step { place, corners, beside, verdict });
+    /// Makes a cell the last step, with its corners if they are known.
+    fn push(&mut self, place: Place, known: Option<Corners<A::Output>>, beside: Option<Corners<A::Output>>) {
+        let tree = self.tree;
+        let look = |mut corners| {
+            let verdict = tree.verdict(&place, &mut corners);
+            (corners, verdict)
+        };
+        let seen =
+            tree.is_looked_at(&place).then(|| look(known.unwrap_or_else(|| tree.sample_corners(&place))));
+        self.trail.push(Step { place, seen, beside });
     }
 }

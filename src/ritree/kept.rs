@@ -15,7 +15,8 @@ use std::io::{self, Read, Write};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::cell::{Corners, Kind, Place, Verdict};
+use super::cell::{Kind, Place, Verdict};
+use super::interpolant::Corners;
 use super::node::{self, Leaf, Node};
 use super::{Attribute, Cache, RiTree};
 use crate::linespace::PlanePair;

@@ -9,6 +9,9 @@
 //!                       (8 corners kept, 8 new ones sampled, shared by both halves)
 //! ```
 //!
+//! That is the paper's way. An [attribute](Attribute::sampling) may have cells looked at on every fourth level only, and lines
+//! interpolated in the simplex that holds them.
+//!
 //! **The law:** what becomes of a cell is a pure function of the cell. So the answer to a line depends neither on the
 //! order of queries, nor on threads, nor on what the cache still holds; where the cache has no room, the cells on the
 //! way are computed, used and forgotten, but for what whoever asks remembers from one line to the next ([`Descent`]).
@@ -20,7 +23,9 @@ pub mod attribute;
 mod cache;
 mod cell;
 mod descent;
+mod discontinuity;
 mod fitted;
+mod interpolant;
 pub mod kept;
 mod node;
 mod stats;
@@ -30,7 +35,7 @@ mod tests;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-pub use attribute::Attribute;
+pub use attribute::{Attribute, Sampling, Scheme};
 pub use cache::{Cache, oldest_to_keep};
 pub use cell::{Place, Reason};
 pub use descent::Descent;
@@ -40,7 +45,8 @@ pub use stats::{BuildCounts, TreeShape};
 
 use crate::geometry::Real;
 use crate::linespace::{LinePoint, PlanePair};
-use cell::{Kind, Verdict, quadrilinear};
+use cell::{Kind, Verdict};
+use interpolant::{Corners, interpolated};
 use node::Node;
 use stats::BuildCounters;
 
@@ -130,39 +136,40 @@ impl<A: Attribute> RiTree<A> {
         root.get().map(|node| &**node)
     }
 
-    fn answer(
-        &self,
-        place: &Place,
-        kind: Kind<&cell::Corners<A::Output>>,
-        stuv: [f64; 4],
-    ) -> Answer<A::Output> {
+    fn answer(&self, place: &Place, kind: Kind<&Corners<A::Output>>, stuv: [f64; 4]) -> Answer<A::Output> {
+        let by_simplex = |corners| place.of_simplex(&self.attribute, corners, stuv, &self.parameters);
         match kind {
             Kind::Empty => Answer::Interpolated(self.attribute.miss()),
             Kind::Smooth(corners) => {
                 let fractions = place.cell.fractions(&stuv.map(A::Real::of));
-                Answer::Interpolated(quadrilinear(&self.attribute, corners, fractions))
+                Answer::Interpolated(interpolated(&self.attribute, corners, fractions))
             }
             Kind::TwoClasses(corners) => {
-                let angle = self.parameters.angular_threshold_deg;
-                place
-                    .of_own_class(&self.attribute, corners, stuv, angle)
-                    .map_or_else(Answer::Trace, Answer::Interpolated)
+                let by_class = || place.of_own_class(&self.attribute, corners, stuv, &self.parameters);
+                by_simplex(corners).map_or_else(by_class, Ok).map_or_else(Answer::Trace, Answer::Interpolated)
             }
             Kind::Traced(reason) => Answer::Trace(reason),
+            Kind::Parted(corners, reason) => {
+                by_simplex(corners).map_or(Answer::Trace(reason), Answer::Interpolated)
+            }
         }
     }
 
-    fn sample_corners(&self, place: &Place) -> cell::Corners<A::Output> {
+    fn sample_corners(&self, place: &Place) -> Corners<A::Output> {
         self.counters.sampled(16, 0);
         place.sample(&self.attribute)
     }
 
-    fn split(&self, place: &Place, corners: &cell::Corners<A::Output>) -> [cell::Corners<A::Output>; 2] {
+    fn split(&self, place: &Place, corners: &Corners<A::Output>) -> [Corners<A::Output>; 2] {
         self.counters.sampled(8, 24);
         place.split(&self.attribute, corners)
     }
 
-    fn verdict(&self, place: &Place, corners: &mut cell::Corners<A::Output>) -> Verdict {
+    fn is_looked_at(&self, place: &Place) -> bool {
+        place.is_looked_at(&self.attribute, &self.parameters)
+    }
+
+    fn verdict(&self, place: &Place, corners: &mut Corners<A::Output>) -> Verdict {
         let middle_sampled = || self.counters.sampled(1, 0);
         place.verdict(&self.attribute, corners, &self.parameters, middle_sampled)
     }

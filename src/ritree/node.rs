@@ -7,7 +7,8 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use super::RiTree;
 use super::attribute::Attribute;
 use super::cache::Cache;
-use super::cell::{Corners, Kind, Place, Verdict};
+use super::cell::{Kind, Place, Verdict};
+use super::interpolant::Corners;
 use super::stats::TreeShape;
 
 /// A cell of the tree. A node that holds neither leaf nor halves nor corners was pruned, or never looked at.
@@ -108,12 +109,11 @@ impl<T: Clone + Send + Sync> Node<T> {
         self.corners.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Gives the node its leaf or its halves, as its cell says; the next to be looked at is the half on the `side` that is asked
-    /// for. If the cache has no room, the node stays as it is and its corners are the error (or `None` if it has none).
+    /// Gives the node its leaf or its halves, as its cell says. If the cache has no room, the node stays as it is and its corners
+    /// are the error (or `None` if it has none).
     pub fn expand<A>(
         &self,
         place: &Place,
-        side: usize,
         tree: &RiTree<A>,
         cache: &Cache,
     ) -> Result<(), Option<Box<Corners<T>>>>
@@ -124,33 +124,37 @@ impl<T: Clone + Send + Sync> Node<T> {
         if self.below.get().is_some() {
             return Ok(());
         }
-        let held = if guard.is_some() { size_of::<Corners<T>>() } else { 0 };
-        // The other half's corners wait, too, unless they are sampled again sooner than kept.
-        let waits = |half: usize| half == side || !tree.attribute.remembers();
-        let of_halves = bytes::<T>(2) + (0..2).filter(|&half| waits(half)).count() * size_of::<Corners<T>>();
+        let of_corners = size_of::<Corners<T>>();
+        let held = if guard.is_some() { of_corners } else { 0 };
+        // Corners of halves wait, unless they are sampled again sooner than kept.
+        let waiting = if tree.attribute.sampling().remembers { 0 } else { 2 * of_corners };
         // Room for the larger outcome is taken first; what is not needed is given back.
-        if !cache.reserve(of_halves) {
+        let room = of_corners.max(bytes::<T>(2) + waiting);
+        if !cache.reserve(room) {
             return Err(guard.clone());
         }
-        let mut corners = guard.take().unwrap_or_else(|| Box::new(tree.sample_corners(place)));
-        let (below, kept) = match tree.verdict(place, &mut corners) {
-            Verdict::Final(kind) => {
-                let kind = kind.map(|()| corners);
-                let kept = leaf_bytes(&kind);
-                (Below::Leaf(Leaf::new(kind, tree.clock.load(Ordering::Relaxed))), kept)
+        let (below, kept) = if tree.is_looked_at(place) {
+            let mut corners = guard.take().unwrap_or_else(|| Box::new(tree.sample_corners(place)));
+            match tree.verdict(place, &mut corners) {
+                Verdict::Final(kind) => {
+                    let leaf = Leaf::new(kind.map(|()| corners), tree.clock.load(Ordering::Relaxed));
+                    let kept = leaf.bytes();
+                    (Below::Leaf(leaf), kept)
+                }
+                Verdict::Split if waiting == 0 => (Below::Halves(Box::default()), bytes::<T>(2)),
+                Verdict::Split => {
+                    let half =
+                        |corners| Self { corners: Mutex::new(Some(Box::new(corners))), ..Self::default() };
+                    let halves = tree.split(place, &corners).map(half);
+                    (Below::Halves(Box::new(halves)), bytes::<T>(2) + waiting)
+                }
             }
-            Verdict::Split => {
-                let [lower, upper] = tree.split(place, &corners);
-                let half = |half: usize, corners: Corners<T>| {
-                    let waiting = waits(half).then(|| Box::new(corners));
-                    Self { corners: Mutex::new(waiting), ..Self::default() }
-                };
-                (Below::Halves(Box::new([half(0, lower), half(1, upper)])), of_halves)
-            }
+        } else {
+            (Below::Halves(Box::default()), bytes::<T>(2))
         };
         let _ = self.below.set(below);
         tree.counters.expanded();
-        cache.release(of_halves - kept + held);
+        cache.release(room - kept + held);
         Ok(())
     }
 
@@ -200,7 +204,10 @@ impl<T: Clone + Send + Sync> Node<T> {
         T: PartialEq + std::fmt::Debug,
     {
         let mut sampled = place.sample(&tree.attribute);
-        let verdict = place.verdict(&tree.attribute, &mut sampled, &tree.parameters, || ());
+        let verdict = match tree.is_looked_at(place) {
+            true => place.verdict(&tree.attribute, &mut sampled, &tree.parameters, || ()),
+            false => Verdict::Split,
+        };
         // Corners are finished as the cells need that they came through.
         let finished = |corners: &Corners<T>| {
             let mut corners = corners.clone();

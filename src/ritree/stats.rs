@@ -99,7 +99,7 @@ impl TreeShape {
             match kind {
                 Kind::Smooth(()) => |shape| &mut shape.smooth_leaves,
                 Kind::Empty => |shape| &mut shape.empty_leaves,
-                Kind::TwoClasses(()) | Kind::Traced(_) => |shape| &mut shape.traced_leaves,
+                Kind::TwoClasses(()) | Kind::Traced(_) | Kind::Parted(..) => |shape| &mut shape.traced_leaves,
             },
         );
     }

@@ -17,6 +17,7 @@ struct Test {
     class: fn([f64; 4]) -> u32,
     can_locate: bool,
     turns: f64,
+    sampling: Sampling,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -29,7 +30,7 @@ const MISS: u32 = 0;
 
 impl Test {
     fn smooth(value: fn([f64; 4]) -> f64) -> Self {
-        Self { value, class: |_| 1, can_locate: true, turns: 0.0 }
+        Self { value, class: |_| 1, can_locate: true, turns: 0.0, sampling: Sampling::PAPER }
     }
 
     fn exact(&self, stuv: [f64; 4]) -> f64 {
@@ -40,6 +41,10 @@ impl Test {
 impl Attribute for Test {
     type Output = Sample;
     type Real = f64;
+
+    fn sampling(&self) -> Sampling {
+        self.sampling
+    }
 
     fn sample(&self, line: LinePoint) -> Sample {
         Sample { value: (self.value)(line.stuv), class: (self.class)(line.stuv) }
@@ -57,8 +62,8 @@ impl Attribute for Test {
         Sample { value: parts.iter().map(|(w, s)| w * s.value).sum(), class: parts[0].1.class }
     }
 
-    fn locate(&self, line: LinePoint) -> Option<Sample> {
-        self.can_locate.then(|| self.sample(line))
+    fn locates(&self) -> bool {
+        self.can_locate
     }
 
     fn miss(&self) -> Sample {
@@ -220,10 +225,9 @@ fn beyond_the_deepest_level_no_cell_is_split() {
 /// A step across the oblique hyperplane s + t + u + v = 1.7.
 fn step(can_locate: bool) -> Test {
     Test {
-        value: |[s, t, u, v]| if s + t + u + v > 1.7 { 10.0 + s - v } else { t + u },
         class: |[s, t, u, v]| if s + t + u + v > 1.7 { 2 } else { 1 },
         can_locate,
-        turns: 0.0,
+        ..Test::smooth(|[s, t, u, v]| if s + t + u + v > 1.7 { 10.0 + s - v } else { t + u })
     }
 }
 
@@ -260,13 +264,73 @@ fn lines_of_a_mixed_cell_are_traced_if_their_side_cannot_be_told_cheaply() {
     assert!(traced(false) > 2 * traced(true));
 }
 
+const SIMPLICIAL: Sampling = Sampling { scheme: Scheme::Simplicial, ..Sampling::PAPER };
+
+#[test]
+fn beside_a_discontinuity_lines_are_interpolated_that_a_simplex_of_one_class_holds() {
+    let answers = |sampling| {
+        let tree = RiTree::new(Test { sampling, ..step(false) }, settings(0.01, 8));
+        let (cache, mut interpolated) = (roomy(), 0);
+        for point in points(6, 3_000) {
+            match tree.query(point, &cache) {
+                Some(Answer::Interpolated(sample)) => {
+                    let error = sample.value - tree.attribute().exact(point.stuv);
+                    assert!(error.abs() < 1e-9, "{point:?}: {error}, bled over the step");
+                    interpolated += 1;
+                }
+                Some(Answer::Trace(Reason::Silhouette)) => {}
+                other => panic!("{other:?}"),
+            }
+        }
+        tree.check_invariants();
+        interpolated
+    };
+    let (cells, simplices) = (answers(Sampling::PAPER), answers(SIMPLICIAL));
+    assert!(simplices > cells + 500, "{simplices}, without simplices {cells}");
+}
+
+#[test]
+fn directions_too_far_apart_in_a_cell_may_be_near_in_a_simplex() {
+    // Turned by 24° over the cell's side, but by twice that from corner to corner.
+    let turning = |sampling| Test { sampling, turns: 0.28, ..Test::smooth(|[s, t, ..]| s + t) };
+    let answer = |sampling, at| {
+        let tree = RiTree::new(turning(sampling), settings(0.01, 4));
+        let answer = tree.query(LinePoint { pair: PlanePair::ALL[0], stuv: at }, &roomy());
+        tree.check_invariants();
+        answer
+    };
+    // Along the diagonal from (s, t) = (1, 0) to (0, 1) directions are the same.
+    let (between, at) = (interpolated(answer(SIMPLICIAL, [0.8, -0.7, 0.3, 0.3])), Reason::Angle);
+    assert!((between - 0.1).abs() < 1e-12, "{between}");
+    assert_eq!(answer(Sampling::PAPER, [0.8, -0.7, 0.3, 0.3]), Some(Answer::Trace(at)));
+}
+
+#[test]
+fn cells_that_are_not_looked_at_are_split_unseen() {
+    let sampling = Sampling { levels_per_look: 4, levels_spared: 2, remembers: true, ..SIMPLICIAL };
+    for attribute in [Test::smooth(|[s, t, u, v]| (s + 2.0 * t).sin() + u * v * v), step(true)] {
+        let tree =
+            |cache| (RiTree::new(Test { sampling, ..attribute }, settings(0.05, 11)), Cache::new(cache));
+        let trees = [1 << 30, 30_000, 0].map(tree);
+        for point in points(7, 2_000) {
+            let [roomy, small, none] = trees.each_ref().map(|(tree, cache)| tree.query(point, cache));
+            assert!(roomy == small && roomy == none, "{point:?}");
+        }
+        let by_depth = trees[0].0.shape().leaves_by_depth;
+        assert!(
+            by_depth[..9].iter().enumerate().all(|(depth, n)| *n == 0 || (11 - depth) % 4 == 0),
+            "{by_depth:?}"
+        );
+        assert!(by_depth[7] > 0 && by_depth.len() > 8, "{by_depth:?}");
+        trees.iter().for_each(|(tree, _)| assert!(tree.check_invariants() <= 1 << 30));
+    }
+}
+
 #[test]
 fn more_than_two_classes_and_directions_too_far_apart_are_traced() {
     let three = Test {
-        value: |_| 1.0,
         class: |[s, t, ..]| if s > 0.55 { 1 } else { 2 + u32::from(t > 0.55) },
-        can_locate: true,
-        turns: 0.0,
+        ..Test::smooth(|_| 1.0)
     };
     let tree = RiTree::new(three, settings(0.01, 4));
     let cache = roomy();
@@ -283,12 +347,8 @@ fn more_than_two_classes_and_directions_too_far_apart_are_traced() {
 #[test]
 fn corners_that_all_miss_prove_nothing() {
     // A needle of hits that no corner of a shallow tree meets.
-    let needle = Test {
-        value: |_| 1.0,
-        class: |[s, ..]| u32::from((s - 0.123_456_789).abs() < 1e-9),
-        can_locate: true,
-        turns: 0.0,
-    };
+    let needle =
+        Test { class: |[s, ..]| u32::from((s - 0.123_456_789).abs() < 1e-9), ..Test::smooth(|_| 1.0) };
     let tree = RiTree::new(needle, settings(0.01, 16));
     let on_the_needle = LinePoint { pair: PlanePair::ALL[0], stuv: [0.123_456_789, 0.2, 0.3, 0.4] };
     assert_eq!(tree.query(on_the_needle, &roomy()), Some(Answer::Trace(Reason::Guard)));
