@@ -26,7 +26,7 @@ const LEVELS_SPARED: u32 = 6;
 
 /// See [`Attribute::angular_share`]: normals turn faster than lengths change. Where they may turn half as far again as the
 /// threshold says, errors are those of the paper.
-const ANGULAR_SHARE: f64 = 1.5;
+const ANGULAR_SHARE: f64 = 1.8;
 
 /// The square of a chord of which only the beginning is known.
 const UNKNOWN: f32 = -1.0;

@@ -17,7 +17,7 @@ pub struct Seen {
     pub class: u32,
     /// The place along the dominant axis, box units.
     pub depth: f32,
-    /// The normal, unit length.
+    /// The normal, unit length; interpolated, as long as the samples' mean.
     pub normal: [f32; 3],
 }
 
@@ -124,7 +124,7 @@ impl<R: Real> Attribute for FirstHit<'_, R> {
         let depth = parts.iter().fold(R::of(0.0), |sum, (weight, s)| sum + *weight * R::of(s.depth.into()));
         let normal = blend(parts.iter().map(|(weight, s)| (*weight, &s.normal)));
         let class = parts.first().map_or(0, |(_, s)| s.class);
-        Seen { class, depth: depth.get() as f32, normal: f32s(normal.normalized()) }
+        Seen { class, depth: depth.get() as f32, normal: f32s(normal) }
     }
 
     fn direction(&self, output: &Seen) -> Option<Vec3<R>> {

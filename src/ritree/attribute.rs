@@ -17,8 +17,8 @@ pub enum Scheme {
 /// How cells are sampled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sampling {
-    /// Cells are looked at on every so manieth level from the greatest depth up, and on those [spared](Self::levels_spared); on
-    /// the levels between they are split unseen. Four levels halve all sides of a cell.
+    /// Cells are looked at on one of so many levels, counted from the greatest depth, and on the first of those
+    /// [spared](Self::levels_spared); on all others they are split unseen. Four levels halve all sides of a cell.
     pub levels_per_look: u32,
     /// How many levels before the greatest depth cells end that hold a discontinuity, or all of whose corners miss: their lines
     /// are traced, and where few lines ask for a cell that is less than to sample it.

@@ -189,8 +189,8 @@ impl Place {
     /// Whether its samples are looked at. If not, it is split unseen.
     pub fn is_looked_at<A: Attribute>(&self, attribute: &A, parameters: &Parameters) -> bool {
         let above = parameters.max_depth.min(DEEPEST).saturating_sub(self.depth);
-        above.is_multiple_of(attribute.sampling().levels_per_look)
-            || self.ends_discontinuities(attribute, parameters)
+        let sampling = attribute.sampling();
+        above.is_multiple_of(sampling.levels_per_look) || above == sampling.levels_spared
     }
 
     /// What is to be done with the cell (§2.3, and §2.5 for its kind). Its corners are finished if that tells it;
