@@ -23,12 +23,13 @@ use crate::surface::{Reach, Surface};
 /// Cells of the lattice along each side.
 const SIDE: usize = 96;
 
-/// Cells along the blocks that are held to be flat, the wide ones first. What is thinner than half a wide block may slip
-/// between its points where it lies before another part of the object.
+/// Cells along the blocks that are held to be flat, the wide ones first. What is thinner than half a wide block, a fiftieth
+/// of the object's width, may slip between its points where another part of the object lies behind it.
 const BLOCKS: [usize; 2] = [4, 2];
 
-/// A block is flat if its inner points are off by no more than the slack: its cells, of half the width, then are off by a
-/// quarter of that, and half of it is left aside around what decides.
+/// A block is flat if its inner points are off by no more than the slack. Between the points of its cells, of half the
+/// width, depths then are off by a quarter of that where the surface is smooth, and by half of it at a crease: this share is
+/// left aside around what decides.
 const ROOM: f64 = 0.5;
 
 /// A place of another object is not hidden by what lies before it by less than this share of the object's longest side.
@@ -165,27 +166,10 @@ impl Lattice {
         }
         let points = Points { lattice: self, table, map };
         let slack = slack * R::of(self.cosine);
-        let Some(width) = points.flat_width::<R>(cell) else {
-            return agreed(points.corners(cell, 1), depth, slack);
-        };
-        let low = cell.map(|x| x / width * width);
-        let corners: [R; 4] = points.corners(low, width);
-        // The surface hides the place if it is met before this depth.
-        let limit = depth - slack;
-        let room = R::of(ROOM * self.cosine * map.slack);
-        let (near, far) = span(&corners);
-        if limit + room < near {
-            return Some(false);
+        match points.flat_width::<R>(cell) {
+            Some(width) => points.interpolated(at, cell.map(|x| x / width * width), width, depth - slack),
+            None => agreed(points.corners(cell, 1), depth, slack),
         }
-        if limit - room > far {
-            return Some(true);
-        }
-        let within = |i: usize| (at[i] - R::of(low[i] as f64)) * R::of(1.0 / width as f64);
-        let (x, y) = (within(0), within(1));
-        let mix = |a: R, b: R, share: R| a + (b - a) * share;
-        let before = limit - mix(mix(corners[0], corners[1], x), mix(corners[2], corners[3], x), y);
-        // Where the interpolated depth may be off by what decides, it does not.
-        (before.abs() >= room).then_some(before.get() > 0.0)
     }
 
     /// The depth at which the light's ray through a point of the lattice first meets the surface; infinite if it does not.
@@ -237,6 +221,25 @@ impl Points<'_, '_> {
     #[inline]
     fn corners<R: Real>(&self, low: [usize; 2], width: usize) -> [R; 4] {
         std::array::from_fn(|bits| self.depth(low[0] + (bits & 1) * width, low[1] + (bits >> 1) * width))
+    }
+
+    /// Whether the surface is met before a depth, between the corners of a cell of a width that may be interpolated. `None`
+    /// if that is too near to tell.
+    fn interpolated<R: Real>(&self, at: [R; 2], low: [usize; 2], width: usize, limit: R) -> Option<bool> {
+        let corners: [R; 4] = self.corners(low, width);
+        let room = R::of(ROOM * self.lattice.cosine * self.map.slack);
+        let (near, far) = span(&corners);
+        if limit + room < near {
+            return Some(false);
+        }
+        if limit - room > far {
+            return Some(true);
+        }
+        let within = |i: usize| (at[i] - R::of(low[i] as f64)) * R::of(1.0 / width as f64);
+        let (x, y) = (within(0), within(1));
+        let mix = |a: R, b: R, share: R| a + (b - a) * share;
+        let before = limit - mix(mix(corners[0], corners[1], x), mix(corners[2], corners[3], x), y);
+        (before.abs() >= room).then_some(before.get() > 0.0)
     }
 
     /// The width of the widest cells that may be interpolated where a narrow one lies. `None` if no block there is flat.
