@@ -4,7 +4,7 @@ use std::marker::PhantomData;
 
 use super::lines::SurfaceLines;
 use super::memo::Memo;
-use super::surface::{SAMPLING, Seen, blend, distance, f32s, vector};
+use super::surface::{Seen, blend, distance, f32s, vector};
 use crate::geometry::{Ray, Real, Vec3};
 use crate::linespace::{Cell, LinePoint, PlanePair};
 use crate::ritree::{Attribute, Sampling};
@@ -119,8 +119,8 @@ impl<R: Real> Attribute for ExitRay<'_, R> {
 
     fn sampling(&self) -> Sampling {
         match self.optics {
-            Optics::Mirror => SAMPLING,
-            Optics::Glass { .. } => Sampling { levels_spared: GLASS_LEVELS_SPARED, ..SAMPLING },
+            Optics::Mirror => self.lines.sampling(),
+            Optics::Glass { .. } => Sampling { levels_spared: GLASS_LEVELS_SPARED, ..self.lines.sampling() },
         }
     }
 

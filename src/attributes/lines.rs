@@ -5,6 +5,7 @@ use glam::{DVec2, DVec3};
 use super::chord::LEAST_SEPARATION;
 use crate::geometry::{Bounds, Ray, Real, Vec3, convex_hull};
 use crate::linespace::{ACROSS, Cell, LinePoint, LineSpace, PlanePair};
+use crate::ritree::{Sampling, Scheme};
 use crate::surface::Surface;
 
 /// A surface with the line space of a cube around it and the points of its hull.
@@ -16,6 +17,7 @@ use crate::surface::Surface;
 #[derive(Clone, Debug)]
 pub struct SurfaceLines<'a> {
     surface: &'a Surface,
+    is_convex: bool,
     space: LineSpace,
     middle: DVec3,
     /// For lines along each axis, what slopes are scaled by, see [`SLOPE_SCALE`].
@@ -38,9 +40,9 @@ pub enum ByDirection {
 type Rim = Vec<DVec2>;
 
 impl<'a> SurfaceLines<'a> {
-    /// For outputs that change with the place that a line meets, and with its direction as `by_direction` says. `None` if the
-    /// surface has no extent.
-    pub fn new(surface: &'a Surface, by_direction: ByDirection) -> Option<Self> {
+    /// For outputs that change with the place that a line meets, and with its direction as `by_direction` says. Convex surfaces
+    /// have no part that hides another. `None` if the surface has no extent.
+    pub fn new(surface: &'a Surface, is_convex: bool, by_direction: ByDirection) -> Option<Self> {
         let bounds = surface.bounds();
         // The cube of the longest side, with room for the rounding of depths, which are told in its unit: planes as near to
         // each other as a sheet is thick would tell directions no finer than 30° at the greatest depth.
@@ -61,12 +63,24 @@ impl<'a> SurfaceLines<'a> {
                 rim(hull.iter().map(of).map(|p| DVec2::new(p[k], a * p[i] + b * p[j])).collect())
             })
         });
-        Some(Self { surface, space, middle, slope_scales: slope_scales.to_array(), rims })
+        Some(Self { surface, is_convex, space, middle, slope_scales: slope_scales.to_array(), rims })
     }
 
     /// The surface.
     pub fn surface(&self) -> &'a Surface {
         self.surface
+    }
+
+    /// How cells of its lines are sampled. Along outlines they are a half larger than elsewhere, in the paper's pictures.
+    pub(super) fn sampling(&self) -> Sampling {
+        Sampling {
+            levels_per_look: 4,
+            levels_spared: 2,
+            remembers: true,
+            scheme: Scheme::Simplicial,
+            // Beside a fold, corners of one class may lie on two parts, one behind the other.
+            parts: self.is_convex,
+        }
     }
 
     /// The line space of a cube around it.
@@ -210,7 +224,7 @@ mod tests {
     #[test]
     fn lines_come_back_from_their_points_and_cells_called_empty_hold_none_that_hits() {
         let surface = Surface::Sphere(Sphere::new(DVec3::new(30.0, -4.0, 7.0), 12.0).expect("a sphere"));
-        let lines = SurfaceLines::new(&surface, ByDirection::Little).expect("an extent");
+        let lines = SurfaceLines::new(&surface, true, ByDirection::Little).expect("an extent");
         let mut rng = rand_pcg::Pcg64::seed_from_u64(5);
         let (mut empty, mut hits) = (0, 0);
         for i in 0..3_000 {

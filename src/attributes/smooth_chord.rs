@@ -3,7 +3,7 @@
 
 use super::lines::{ByDirection, SurfaceLines};
 use super::memo::Memo;
-use super::surface::{SAMPLING, f32s, vector};
+use super::surface::{f32s, vector};
 use crate::geometry::{Ray, Real, Vec3};
 use crate::linespace::{Cell, LinePoint, PlanePair};
 use crate::ritree::{Attribute, Sampling};
@@ -76,7 +76,11 @@ impl<'a, R: Real> SmoothChords<'a, R> {
     /// The chords of a closed convex surface. `None` if it has no extent.
     pub fn new(surface: &'a Surface) -> Option<Self> {
         let unit = 0.5 * surface.bounds().size().max_element();
-        Some(Self { lines: SurfaceLines::new(surface, ByDirection::Little)?, unit, memo: Memo::default() })
+        Some(Self {
+            lines: SurfaceLines::new(surface, true, ByDirection::Little)?,
+            unit,
+            memo: Memo::default(),
+        })
     }
 
     /// The body's lines.
@@ -129,7 +133,7 @@ impl<R: Real> Attribute for SmoothChords<'_, R> {
     }
 
     fn sampling(&self) -> Sampling {
-        Sampling { levels_spared: LEVELS_SPARED, ..SAMPLING }
+        Sampling { levels_spared: LEVELS_SPARED, ..self.lines.sampling() }
     }
 
     fn class(&self, output: &Self::Output) -> u32 {

@@ -6,7 +6,7 @@ use super::lines::SurfaceLines;
 use super::memo::Memo;
 use crate::geometry::{Real, Vec3};
 use crate::linespace::{Cell, LinePoint, PlanePair};
-use crate::ritree::{Attribute, Sampling, Scheme};
+use crate::ritree::{Attribute, Sampling};
 use crate::surface::{Hit, Reach};
 
 /// What is known of a line's first hit, as samples hold it: {normal, point} of the paper, the point by how far along the
@@ -60,10 +60,6 @@ pub(super) fn blend<'a, R: Real>(parts: impl Iterator<Item = (R, &'a [f32; 3])>)
     parts.fold(Vec3::default(), |sum, (weight, v)| sum + vector(*v) * weight)
 }
 
-/// How cells of surfaces are sampled. Along outlines they are a half larger than elsewhere, in the paper's pictures.
-pub(super) const SAMPLING: Sampling =
-    Sampling { levels_per_look: 4, levels_spared: 2, remembers: true, scheme: Scheme::Simplicial };
-
 /// How far two hits of one line are apart, box units, where a turn of the normal counts `leverage` times.
 pub(super) fn distance<R: Real>(a: &Seen, b: &Seen, leverage: f64) -> f64 {
     let turned = (vector::<R>(a.normal) - vector(b.normal)) * R::of(leverage);
@@ -99,7 +95,7 @@ impl<R: Real> Attribute for FirstHit<'_, R> {
     }
 
     fn sampling(&self) -> Sampling {
-        SAMPLING
+        self.lines.sampling()
     }
 
     fn class(&self, output: &Seen) -> u32 {

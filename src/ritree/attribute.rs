@@ -9,8 +9,7 @@ pub enum Scheme {
     /// By all 16, linearly in each of the four coordinates (§2.4).
     Quadrilinear,
     /// By the 5 of the simplex that holds the line, linearly: a third of the operations. What bends one way along one side and
-    /// the other way along another is told worse, all else better. Beside a discontinuity, too, lines are interpolated that a
-    /// simplex of one class holds.
+    /// the other way along another is told worse, all else better.
     Simplicial,
 }
 
@@ -27,12 +26,20 @@ pub struct Sampling {
     pub remembers: bool,
     /// How lines are interpolated.
     pub scheme: Scheme,
+    /// Whether lines are interpolated in a cell whose corners do not fit together, if they lie in a simplex whose corners do.
+    /// Not for surfaces that may hide parts of their own: one class is then no proof that all corners lie on one part.
+    pub parts: bool,
 }
 
 impl Sampling {
     /// The paper's way (§2.3, §2.4).
-    pub const PAPER: Self =
-        Self { levels_per_look: 1, levels_spared: 0, remembers: false, scheme: Scheme::Quadrilinear };
+    pub const PAPER: Self = Self {
+        levels_per_look: 1,
+        levels_spared: 0,
+        remembers: false,
+        scheme: Scheme::Quadrilinear,
+        parts: false,
+    };
 }
 
 /// A geometric attribute of lines near one object: what an RI-tree samples and interpolates.

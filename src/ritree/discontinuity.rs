@@ -2,7 +2,7 @@
 //! (§2.5).
 
 use super::Parameters;
-use super::attribute::{Attribute, Scheme};
+use super::attribute::Attribute;
 use super::cell::{Kind, Place, Reason};
 use super::interpolant::{Corners, Simplex, has_simplex, linear_weights};
 use crate::geometry::Real;
@@ -44,7 +44,7 @@ impl Place {
         stuv: [f64; 4],
         parameters: &Parameters,
     ) -> Option<A::Output> {
-        if attribute.sampling().scheme != Scheme::Simplicial {
+        if !attribute.sampling().parts {
             return None;
         }
         let fits = |simplex: &Simplex<A::Real>| {
@@ -152,8 +152,7 @@ fn may_hold_simplex<A: Attribute>(
     class_of: impl Fn(&A::Output) -> u32,
 ) -> bool {
     let is_hit = |c: &A::Output| !attribute.is_miss(attribute.outline_class(c));
-    attribute.sampling().scheme == Scheme::Simplicial
-        && has_simplex(|bits| is_hit(&corners[bits]).then(|| class_of(&corners[bits])))
+    attribute.sampling().parts && has_simplex(|bits| is_hit(&corners[bits]).then(|| class_of(&corners[bits])))
 }
 
 /// Whether two of the outputs' directions differ by more than the threshold.

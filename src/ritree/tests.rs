@@ -264,7 +264,7 @@ fn lines_of_a_mixed_cell_are_traced_if_their_side_cannot_be_told_cheaply() {
     assert!(traced(false) > 2 * traced(true));
 }
 
-const SIMPLICIAL: Sampling = Sampling { scheme: Scheme::Simplicial, ..Sampling::PAPER };
+const SIMPLICIAL: Sampling = Sampling { scheme: Scheme::Simplicial, parts: true, ..Sampling::PAPER };
 
 #[test]
 fn beside_a_discontinuity_lines_are_interpolated_that_a_simplex_of_one_class_holds() {

@@ -81,7 +81,7 @@ impl<'a, R: Real> Seer<'a, R> {
                 Some(Optics::Glass { .. }) => ByDirection::Much,
                 Some(Optics::Mirror) | None => ByDirection::Little,
             };
-            let lines = SurfaceLines::new(&object.surface, by_direction)?;
+            let lines = SurfaceLines::new(&object.surface, object.is_convex, by_direction)?;
             Some(match optics {
                 None => Tree::Seen(RiTree::new(FirstHit::new(lines), parameters)),
                 Some(optics) => {
