@@ -193,11 +193,11 @@ impl<'a, R: Real> Renderer<'a, R> {
         for (column, row) in region.places() {
             light.was_traced = false;
             let places = view.samples.of_pixel(column, row);
-            let sum = places.iter().fold(Vec3::default(), |sum, [x, y]| {
+            let sum = places.fold(Vec3::default(), |sum, [x, y]| {
                 let ray = view.camera.ray(view.size, f64::from(column) + x, f64::from(row) + y);
                 sum + light.radiance(&ray, R::of(1.0), None, 0, true)
             });
-            let mean = sum * R::of(1.0 / places.len() as f64);
+            let mean = sum * R::of(1.0 / f64::from(view.samples.count()));
             tile.colours.push(mean.get().as_vec3().to_array());
             tile.traced.push(light.was_traced);
         }

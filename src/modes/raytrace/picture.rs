@@ -95,21 +95,21 @@ impl Samples {
         (side * side == count && (1..=16).contains(&side)).then_some(Self { side, seed })
     }
 
-    /// The places in one pixel, from 0 to 1 along columns and rows.
-    pub fn of_pixel(&self, column: u32, row: u32) -> Vec<[f64; 2]> {
+    /// The places in one pixel, row by row, from 0 to 1 along columns and rows.
+    pub fn of_pixel(&self, column: u32, row: u32) -> impl Iterator<Item = [f64; 2]> {
         let pixel = u64::from(row) << 32 | u64::from(column);
         let mut random = self
             .seed
             .map(|seed| rand_pcg::Pcg64Mcg::seed_from_u64(seed ^ pixel.wrapping_mul(0x9e37_79b9_7f4a_7c15)));
         let mut within =
-            || random.as_mut().map_or(0.5, |r| (r.next_u64() >> 11) as f64 / (1u64 << 53) as f64);
-        let side = f64::from(self.side);
-        let mut places = Vec::with_capacity((self.side * self.side) as usize);
-        for j in 0..self.side {
-            for i in 0..self.side {
-                places.push([(f64::from(i) + within()) / side, (f64::from(j) + within()) / side]);
-            }
-        }
-        places
+            move || random.as_mut().map_or(0.5, |r| (r.next_u64() >> 11) as f64 / (1u64 << 53) as f64);
+        let side = self.side;
+        (0..side * side)
+            .map(move |n| [n % side, n / side].map(|i| (f64::from(i) + within()) / f64::from(side)))
+    }
+
+    /// How many rays a pixel has.
+    pub fn count(&self) -> u32 {
+        self.side * self.side
     }
 }

@@ -91,11 +91,12 @@ fn counting_operations_changes_no_colour() {
 #[test]
 fn rays_of_a_pixel_cover_it_and_depend_on_the_seed_alone() {
     assert!(Samples::new(8, None).is_none() && Samples::new(0, None).is_none());
-    assert_eq!(samples().of_pixel(3, 4), [[0.5, 0.5]]);
+    assert_eq!(samples().of_pixel(3, 4).collect::<Vec<_>>(), [[0.5, 0.5]]);
     let seeded = Samples::new(9, Some(7)).expect("a count");
-    let places = seeded.of_pixel(10, 20);
-    assert_eq!(places, seeded.of_pixel(10, 20));
-    assert_ne!(places, seeded.of_pixel(11, 20));
+    let of_pixel = |column| seeded.of_pixel(column, 20).collect::<Vec<_>>();
+    let places = of_pixel(10);
+    assert_eq!(places, of_pixel(10));
+    assert_ne!(places, of_pixel(11));
     for (i, [x, y]) in places.iter().enumerate() {
         assert_eq!(((x * 3.0) as usize, (y * 3.0) as usize), (i % 3, i / 3));
     }
