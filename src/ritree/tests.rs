@@ -317,7 +317,7 @@ fn cells_that_are_not_looked_at_are_split_unseen() {
             assert!(roomy == small && roomy == none, "{point:?}");
         }
         let by_depth = trees[0].0.shape().leaves_by_depth;
-        let is_looked_at = |depth: usize| depth == 9 || (11 - depth) % 4 == 0;
+        let is_looked_at = |depth: usize| depth == 9 || (11 - depth).is_multiple_of(4);
         let is_right = |(depth, n): (usize, &u64)| *n == 0 || is_looked_at(depth);
         assert!(by_depth.iter().enumerate().all(is_right), "{by_depth:?}");
         assert!(by_depth[7] > 0 && by_depth.len() > 8, "{by_depth:?}");
