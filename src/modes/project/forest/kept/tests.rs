@@ -163,7 +163,7 @@ fn trees_of_other_bodies_settings_and_versions_are_refused_by_name() {
         assert!(problem.contains(words), "{problem}");
     };
     says(&changed(0, b'C'), "not a file of trees");
-    says(&changed(16, 9), "version 9 of the format; this program reads 3");
+    says(&changed(16, 9), &format!("version 9 of the format; this program reads {VERSION}"));
     says(&changed(20, bytes[20] ^ 1), "says that it is");
     says(&changed(27, 255), "says that it is");
     let program = bytes.windows(5).position(|w| w == env!("CARGO_PKG_VERSION").as_bytes()).expect("in it");
