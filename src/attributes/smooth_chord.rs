@@ -24,8 +24,8 @@ pub struct SmoothChord {
 /// more than all the rest. With six levels fewer a picture of the paper's size takes the fewest operations.
 const LEVELS_SPARED: u32 = 6;
 
-/// See [`Attribute::angular_share`]: normals turn faster than lengths change. Where they may turn half as far again as the
-/// threshold says, errors are those of the paper.
+/// See [`Attribute::angular_share`]: normals turn faster than lengths change. Where they may turn four fifths as far again
+/// as the threshold says, errors are those of the paper.
 const ANGULAR_SHARE: f64 = 1.8;
 
 /// The square of a chord of which only the beginning is known.

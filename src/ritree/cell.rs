@@ -28,8 +28,8 @@ pub enum Kind<C = ()> {
     Empty,
     /// By interpolation of its corners.
     Smooth(C),
-    /// A discontinuity between outlines of two classes cuts it: a line that no [simplex](super::interpolant::Simplex) of one class holds is located,
-    /// and interpolated from the samples on its side if they suffice.
+    /// A discontinuity between outlines of two classes cuts it: a line that no [simplex](super::interpolant::Simplex) of one
+    /// class holds is located, and interpolated from the samples on its side if they suffice.
     TwoClasses(C),
     /// By tracing.
     Traced(Reason),
@@ -191,6 +191,20 @@ impl Place {
         let above = parameters.max_depth.min(DEEPEST).saturating_sub(self.depth);
         let sampling = attribute.sampling();
         above.is_multiple_of(sampling.levels_per_look) || above == sampling.levels_spared
+    }
+
+    /// Its corners and what is to be done with it, computed anew: what others made of it is held against that.
+    pub fn anew<A: Attribute>(
+        &self,
+        attribute: &A,
+        parameters: &Parameters,
+    ) -> (Corners<A::Output>, Verdict) {
+        let mut corners = self.sample(attribute);
+        let verdict = match self.is_looked_at(attribute, parameters) {
+            true => self.verdict(attribute, &mut corners, parameters, || ()),
+            false => Verdict::Split,
+        };
+        (corners, verdict)
     }
 
     /// What is to be done with the cell (§2.3, and §2.5 for its kind). Its corners are finished if that tells it;

@@ -49,7 +49,7 @@ impl Place {
         }
         let fits = |simplex: &Simplex<A::Real>| {
             let [first, rest @ ..] = simplex.corners().map(|bits| &corners[bits]);
-            !attribute.is_miss(attribute.outline_class(first))
+            is_hit(attribute, first)
                 && rest.iter().all(|c| attribute.class(c) == attribute.class(first))
                 && !spread_exceeds(
                     attribute,
@@ -145,14 +145,18 @@ fn usable<A: Attribute>(
     Ok(side)
 }
 
+fn is_hit<A: Attribute>(attribute: &A, output: &A::Output) -> bool {
+    !attribute.is_miss(attribute.outline_class(output))
+}
+
 /// Whether lines may be interpolated in a simplex whose corners all hit and are of one class.
 fn may_hold_simplex<A: Attribute>(
     attribute: &A,
     corners: &Corners<A::Output>,
     class_of: impl Fn(&A::Output) -> u32,
 ) -> bool {
-    let is_hit = |c: &A::Output| !attribute.is_miss(attribute.outline_class(c));
-    attribute.sampling().parts && has_simplex(|bits| is_hit(&corners[bits]).then(|| class_of(&corners[bits])))
+    attribute.sampling().parts
+        && has_simplex(|bits| is_hit(attribute, &corners[bits]).then(|| class_of(&corners[bits])))
 }
 
 /// Whether two of the outputs' directions differ by more than the threshold.

@@ -235,9 +235,8 @@ impl<A: Keepable> RiTree<A> {
                 let node = node.filter(|_| cache.reserve(node::leaf_bytes(&kind)));
                 if loaded.count(node.is_some()) {
                     // A look at what was read is none of what growing the tree takes.
-                    let mut sampled = place.sample(&self.attribute);
+                    let (sampled, verdict) = place.anew(&self.attribute, &self.parameters);
                     let is_same = kind.corners().is_none_or(|corners| **corners == sampled);
-                    let verdict = place.verdict(&self.attribute, &mut sampled, &self.parameters, || ());
                     if !is_same || verdict != Verdict::Final(kind.bare()) {
                         return Err(Unreadable::damaged("a cell is not what this program makes of it"));
                     }

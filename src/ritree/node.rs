@@ -203,11 +203,7 @@ impl<T: Clone + Send + Sync> Node<T> {
         A: Attribute<Output = T>,
         T: PartialEq + std::fmt::Debug,
     {
-        let mut sampled = place.sample(&tree.attribute);
-        let verdict = match tree.is_looked_at(place) {
-            true => place.verdict(&tree.attribute, &mut sampled, &tree.parameters, || ()),
-            false => Verdict::Split,
-        };
+        let (sampled, verdict) = place.anew(&tree.attribute, &tree.parameters);
         // Corners are finished as the cells need that they came through.
         let finished = |corners: &Corners<T>| {
             let mut corners = corners.clone();
