@@ -186,6 +186,9 @@ impl BoxTree {
     }
 }
 
+/// Items from which on the two sides of a split are built at the same time.
+const PARALLEL_ITEMS: usize = 4096;
+
 fn split(boxes: &[Bounds], items: &mut [u32], first: usize, depth: usize, nodes: &mut Vec<Node>) {
     if items.is_empty() {
         return;
@@ -196,12 +199,28 @@ fn split(boxes: &[Bounds], items: &mut [u32], first: usize, depth: usize, nodes:
     if items.len() <= LEAF_ITEMS {
         return;
     }
+    nodes[index].count = 0;
+    let is_long = items.len() >= PARALLEL_ITEMS;
     let middle = partition(boxes, items, depth < COST_SPLITS);
     let (left, right) = items.split_at_mut(middle);
-    split(boxes, left, first, depth + 1, nodes);
-    nodes[index].start = nodes.len() as u32;
-    nodes[index].count = 0;
-    split(boxes, right, first + middle, depth + 1, nodes);
+    if is_long {
+        let mut of_right = Vec::with_capacity(right.len());
+        rayon::join(
+            || split(boxes, left, first, depth + 1, nodes),
+            || split(boxes, right, first + middle, depth + 1, &mut of_right),
+        );
+        // Those of the right side counted from 0.
+        let offset = nodes.len() as u32;
+        nodes[index].start = offset;
+        nodes.extend(of_right.into_iter().map(|node| match node.count {
+            0 => Node { start: node.start + offset, ..node },
+            _ => node,
+        }));
+    } else {
+        split(boxes, left, first, depth + 1, nodes);
+        nodes[index].start = nodes.len() as u32;
+        split(boxes, right, first + middle, depth + 1, nodes);
+    }
 }
 
 /// Reorders `items` so that the cheapest split is at the returned place, strictly inside; the middle one unless
@@ -312,6 +331,25 @@ mod tests {
         let all = (0..120u32).flat_map(|i| (0..90u32).map(move |j| (i, j)));
         let brute: Vec<_> = all.filter(|&(i, j)| a[i as usize].touches(&b[j as usize])).collect();
         assert_eq!(found, brute);
+    }
+
+    #[test]
+    fn hierarchies_of_many_boxes_are_those_of_few_built_one_after_the_other() {
+        let boxes = random_boxes(4, 3 * PARALLEL_ITEMS);
+        let tree = BoxTree::build(&boxes);
+        let mut seen = vec![0; boxes.len()];
+        tree.items_under(0).iter().for_each(|&i| seen[i as usize] += 1);
+        assert!(seen.iter().all(|&times| times == 1));
+        for node in 0..tree.nodes.len() as u32 {
+            let inside =
+                tree.items_under(node).iter().fold(Bounds::EMPTY, |b, &i| b.union(boxes[i as usize]));
+            assert_eq!(tree.bounds_of(node), inside, "node {node}");
+        }
+        // One thread builds the same nodes.
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+        let alone = pool.install(|| BoxTree::build(&boxes));
+        let told = |tree: &BoxTree| tree.nodes.iter().map(|n| (n.start, n.count)).collect::<Vec<_>>();
+        assert_eq!((told(&alone), &alone.items), (told(&tree), &tree.items));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Surfaces of many Bezier patches, their pieces in a hierarchy of boxes.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::frame::{Slabs, steady_gap};
 use super::patch::BezierPatch;
@@ -27,7 +28,7 @@ impl Shell {
         }
         let (patches, classes): (Vec<_>, Vec<_>) = patches.into_iter().unzip();
         let of_patch = |(index, patch)| Piece::of_patch(patch, index as u32);
-        let pieces: Vec<Piece> = patches.iter().enumerate().flat_map(of_patch).collect();
+        let pieces: Vec<Piece> = patches.par_iter().enumerate().flat_map_iter(of_patch).collect();
         let tree = BoxTree::build(&pieces.iter().map(|piece| piece.bounds).collect::<Vec<_>>());
         let bounds = tree.bounds();
         Some(Self { patches, classes, pieces, tree, bounds })
