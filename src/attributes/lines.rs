@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::chord::LEAST_SEPARATION;
+use super::surface::{Seen, vector};
 use crate::geometry::{Bounds, Ray, Real, Vec3, convex_hull};
 use crate::linespace::{ACROSS, Cell, LinePoint, LineSpace, PlanePair};
 use crate::ritree::{Sampling, Scheme};
@@ -78,7 +79,7 @@ impl<'a> SurfaceLines<'a> {
             levels_spared: 2,
             remembers: true,
             scheme: Scheme::Simplicial,
-            // Beside a fold, corners of one class may lie on two parts, one behind the other.
+            // Beside a fold, lines between five that hit may pass the surface by.
             parts: self.is_convex,
         }
     }
@@ -159,6 +160,32 @@ impl<'a> SurfaceLines<'a> {
         squares.fold(R::of(0.0), |sum, x| sum + x).sqrt().get()
     }
 
+    /// Whether the places where two lines of one pair hit, told by their depths and unit normals, lie side by side on the
+    /// surface and not on two parts of it, one behind the other: the way between them runs across the normals' mean. Of places on a
+    /// sphere it does exactly.
+    pub(super) fn are_joined<R: Real>(&self, lines: [LinePoint; 2], seen: [&Seen; 2]) -> bool {
+        if self.is_convex {
+            return true;
+        }
+        let [a, b] = [0, 1].map(|i| self.place_of::<R>(&lines[i], seen[i].depth));
+        let [k, i, j] = lines[0].pair.axes();
+        let [m, n] = seen.map(|seen| vector::<R>(seen.normal));
+        let mean = m + n;
+        let mean = Vec3::new(mean.axis(i), mean.axis(j), mean.axis(k));
+        let way = b - a;
+        let along = way.dot(mean);
+        (along * along).get() <= JOINED_SINE * JOINED_SINE * (way.dot(way) * mean.dot(mean)).get()
+    }
+
+    /// Where a line is at a depth, from the middle: across the axis and along it, box units.
+    fn place_of<R: Real>(&self, line: &LinePoint, depth: f32) -> Vec3<R> {
+        let [k, ..] = line.pair.axes();
+        let [x, y, p, q] = line.stuv.map(|c| R::of(c - 0.5));
+        let depth = R::of(f64::from(depth) - 0.5);
+        let (in_box, over) = (R::of(1.0 / OFFSET_SCALE), depth * R::of(1.0 / self.slope_scales[k]));
+        Vec3::new(x * in_box + p * over, y * in_box + q * over, depth)
+    }
+
     /// Whether no line of the cell meets the surface, proved: all of the hull lies on one side of what the lines reach,
     /// seen along one of eight directions across the axis.
     pub fn is_certainly_empty<R: Real>(&self, pair: PlanePair, cell: &Cell) -> bool {
@@ -188,6 +215,10 @@ const OFFSET_SCALE: f64 = 1.5;
 /// Of a body that is flat along the lines' axis they take as much less as it is thin: it is met near the middle, where lines of
 /// any slope are in their places. Where outputs change much with the direction they take all of it.
 const SLOPE_SCALE: f64 = 0.75;
+
+/// Places of one class are [side by side](SurfaceLines::are_joined) if the way between them is no steeper on the mean of the surface
+/// than by this sine.
+const JOINED_SINE: f64 = 0.05;
 
 /// No body counts as thinner than this share of its longest side: normals and exit rays may depend on the slope alone.
 const LEAST_FLATNESS: f64 = 1.0 / 4.0;
@@ -219,7 +250,41 @@ mod tests {
     use rand::{RngExt, SeedableRng};
 
     use super::*;
-    use crate::surface::{Reach, Sphere};
+    use crate::surface::{BezierPatch, Reach, Shell, Sphere};
+
+    #[test]
+    fn places_on_one_part_are_joined_and_those_on_two_are_not() {
+        let flat = |x: [f64; 2], z: f64| {
+            let row = |x| vec![DVec3::new(x, -10.0, z), DVec3::new(x, 10.0, z)];
+            (BezierPatch::elevated(&[row(x[0]), row(x[1])]).expect("a net"), 1)
+        };
+        let steps = Shell::new(vec![flat([-10.0, 0.0], 0.0), flat([0.0, 10.0], 2.0)]).expect("patches");
+        let ball = Sphere::new(DVec3::new(30.0, -4.0, 7.0), 12.0).expect("a sphere");
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(6);
+        for surface in [Surface::Shell(steps), Surface::Sphere(ball)] {
+            let lines = SurfaceLines::new(&surface, false, ByDirection::Little).expect("an extent");
+            let (mut same, mut apart) = (0, 0);
+            for i in 0..4_000 {
+                let pair = PlanePair::ALL[i % 6];
+                let near = |x: f64, by: f64, rng: &mut rand_pcg::Pcg64| x + rng.random_range(-by..by);
+                let one: [f64; 4] = std::array::from_fn(|_| near(0.5, 0.7, &mut rng));
+                let other = one.map(|x| near(x, 0.1, &mut rng));
+                let seen = [one, other].map(|stuv| {
+                    let line = LinePoint { pair, stuv };
+                    let (seen, hit) = Seen::along::<f64>(&lines, line);
+                    (line, seen, hit.map(|hit| hit.place(&lines.ray(line))))
+                });
+                let [(a, of_a, Some(at_a)), (b, of_b, Some(at_b))] = seen else { continue };
+                if of_a.class == of_b.class {
+                    let is_one_part = (at_a.z - at_b.z).abs() < 1e-9 || matches!(surface, Surface::Sphere(_));
+                    let are_joined = lines.are_joined::<f64>([a, b], [&of_a, &of_b]);
+                    assert_eq!(are_joined, is_one_part, "{at_a:?} {at_b:?}");
+                    *(if is_one_part { &mut same } else { &mut apart }) += 1;
+                }
+            }
+            assert!(same > 300 && (apart > 20 || matches!(surface, Surface::Sphere(_))), "{same} {apart}");
+        }
+    }
 
     #[test]
     fn lines_come_back_from_their_points_and_cells_called_empty_hold_none_that_hits() {

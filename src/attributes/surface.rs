@@ -110,6 +110,10 @@ impl<R: Real> Attribute for FirstHit<'_, R> {
         class == Seen::MISS.class
     }
 
+    fn are_joined(&self, lines: [LinePoint; 2], outputs: [&Seen; 2]) -> bool {
+        self.lines.are_joined::<R>(lines, outputs)
+    }
+
     /// The paper's distance is that of the rays (point, normal) in line space. On one line that is, but for slopes of at
     /// most 1, how far the points and the normals' ends are apart, box units.
     fn distance(&self, a: &Seen, b: &Seen) -> f64 {

@@ -27,7 +27,7 @@ pub struct Sampling {
     /// How lines are interpolated.
     pub scheme: Scheme,
     /// Whether lines are interpolated in a cell whose corners do not fit together, if they lie in a simplex whose corners do.
-    /// Not for surfaces that may hide parts of their own: one class is then no proof that all corners lie on one part.
+    /// Not for surfaces that may hide parts of their own.
     pub parts: bool,
 }
 
@@ -115,6 +115,12 @@ pub trait Attribute: Sync {
     /// knows, it knows better.
     fn told(&self, _outline: &Self::Output, interpolated: Self::Output) -> Self::Output {
         interpolated
+    }
+
+    /// Whether the outputs of two lines, which hit and are of one class, lie side by side on what is hit. Surfaces may hide parts of
+    /// their own: one class is then no proof.
+    fn are_joined(&self, _lines: [LinePoint; 2], _outputs: [&Self::Output; 2]) -> bool {
+        true
     }
 
     /// Whether the class stands for lines that do not meet the object.

@@ -1,9 +1,8 @@
-//! What a cell's samples decide: whether it is final, and what its lines get. Pure functions of the cell.
+//! Cells of line space, and the kinds of final ones.
 
 use super::Parameters;
 use super::attribute::Attribute;
-use super::discontinuity::{Classes, spread_exceeds};
-use super::interpolant::{Corners, interpolated};
+use super::interpolant::Corners;
 use crate::geometry::Real;
 use crate::linespace::{Cell, LinePoint, PlanePair};
 
@@ -11,22 +10,13 @@ use crate::linespace::{Cell, LinePoint, PlanePair};
 /// deeper, halving a cell would give the cell again, without end.
 const DEEPEST: u32 = 120;
 
-/// What is to be done with a cell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// Its halves are to be looked at.
-    Split,
-    /// It answers its lines itself.
-    Final(Kind),
-}
-
-/// How a final cell answers its lines, with the corners that it needs to. The order of these, and of the reasons, is part of
+/// How a final cell answers its lines, with the samples that it needs to. The order of these, and of the reasons, is part of
 /// the format of [kept](super::kept) trees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Kind<C = ()> {
     /// No line meets the object, proved.
     Empty,
-    /// By interpolation of its corners.
+    /// By interpolation.
     Smooth(C),
     /// A discontinuity between outlines of two classes cuts it: a line that no [simplex](super::interpolant::Simplex) of one
     /// class holds is located, and interpolated from the samples on its side if they suffice.
@@ -38,14 +28,14 @@ pub enum Kind<C = ()> {
 }
 
 impl<C> Kind<C> {
-    /// The same kind with other corners.
+    /// The same kind with other samples.
     pub fn map<D>(self, map: impl FnOnce(C) -> D) -> Kind<D> {
         match self {
             Self::Empty => Kind::Empty,
-            Self::Smooth(corners) => Kind::Smooth(map(corners)),
-            Self::TwoClasses(corners) => Kind::TwoClasses(map(corners)),
+            Self::Smooth(samples) => Kind::Smooth(map(samples)),
+            Self::TwoClasses(samples) => Kind::TwoClasses(map(samples)),
             Self::Traced(reason) => Kind::Traced(reason),
-            Self::Parted(corners, reason) => Kind::Parted(map(corners), reason),
+            Self::Parted(samples, reason) => Kind::Parted(map(samples), reason),
         }
     }
 
@@ -54,22 +44,22 @@ impl<C> Kind<C> {
         self.as_ref().map(|_| ())
     }
 
-    /// The corners, if they are needed.
-    pub fn corners(&self) -> Option<&C> {
+    /// The samples, if they are needed.
+    pub fn samples(&self) -> Option<&C> {
         match self {
-            Self::Smooth(corners) | Self::TwoClasses(corners) | Self::Parted(corners, _) => Some(corners),
+            Self::Smooth(samples) | Self::TwoClasses(samples) | Self::Parted(samples, _) => Some(samples),
             Self::Empty | Self::Traced(_) => None,
         }
     }
 
-    /// The same kind with its corners where they are.
+    /// The same kind with its samples where they are.
     pub fn as_ref(&self) -> Kind<&C> {
         match self {
             Self::Empty => Kind::Empty,
-            Self::Smooth(corners) => Kind::Smooth(corners),
-            Self::TwoClasses(corners) => Kind::TwoClasses(corners),
+            Self::Smooth(samples) => Kind::Smooth(samples),
+            Self::TwoClasses(samples) => Kind::TwoClasses(samples),
             Self::Traced(reason) => Kind::Traced(*reason),
-            Self::Parted(corners, reason) => Kind::Parted(corners, *reason),
+            Self::Parted(samples, reason) => Kind::Parted(samples, *reason),
         }
     }
 }
@@ -139,15 +129,25 @@ impl Place {
         LinePoint { pair: self.pair, stuv }
     }
 
+    /// The line of a corner, by its bits.
+    pub(super) fn corner(&self, bits: usize) -> LinePoint {
+        self.line(self.cell.corner(bits))
+    }
+
+    /// The line in the middle.
+    pub(super) fn middle(&self) -> LinePoint {
+        self.line(self.cell.at([0.5; 4]))
+    }
+
     /// The outlines of all 16 corners.
     pub fn sample<A: Attribute>(&self, attribute: &A) -> Corners<A::Output> {
-        std::array::from_fn(|bits| attribute.outline(self.line(self.cell.corner(bits))))
+        std::array::from_fn(|bits| attribute.outline(self.corner(bits)))
     }
 
     /// The corners' whole samples.
     pub fn finish<A: Attribute>(&self, attribute: &A, corners: &mut Corners<A::Output>) {
         for (bits, corner) in corners.iter_mut().enumerate() {
-            attribute.finish(self.line(self.cell.corner(bits)), corner);
+            attribute.finish(self.corner(bits), corner);
         }
     }
 
@@ -181,7 +181,7 @@ impl Place {
     }
 
     /// Whether it is final if it holds a discontinuity, or all of its corners miss.
-    fn ends_discontinuities<A: Attribute>(&self, attribute: &A, parameters: &Parameters) -> bool {
+    pub(super) fn ends_discontinuities<A: Attribute>(&self, attribute: &A, parameters: &Parameters) -> bool {
         let spared = attribute.sampling().levels_spared;
         self.depth.saturating_add(spared) >= parameters.max_depth || self.is_deepest(parameters)
     }
@@ -192,118 +192,4 @@ impl Place {
         let sampling = attribute.sampling();
         above.is_multiple_of(sampling.levels_per_look) || above == sampling.levels_spared
     }
-
-    /// Its corners and what is to be done with it, computed anew: what others made of it is held against that.
-    pub fn anew<A: Attribute>(
-        &self,
-        attribute: &A,
-        parameters: &Parameters,
-    ) -> (Corners<A::Output>, Verdict) {
-        let mut corners = self.sample(attribute);
-        let verdict = match self.is_looked_at(attribute, parameters) {
-            true => self.verdict(attribute, &mut corners, parameters, || ()),
-            false => Verdict::Split,
-        };
-        (corners, verdict)
-    }
-
-    /// What is to be done with the cell (§2.3, and §2.5 for its kind). Its corners are finished if that tells it;
-    /// `middle_sampled` is told of each sample of a midpoint test.
-    pub fn verdict<A: Attribute>(
-        &self,
-        attribute: &A,
-        corners: &mut Corners<A::Output>,
-        parameters: &Parameters,
-        middle_sampled: impl Fn(),
-    ) -> Verdict {
-        let ends_discontinuities = self.ends_discontinuities(attribute, parameters);
-        // No interpolant crosses a discontinuity; smaller cells leave fewer lines on it.
-        let parted = |why, corners: &mut _| match ends_discontinuities {
-            true => Verdict::Final(self.parted(attribute, corners, why, parameters)),
-            false => Verdict::Split,
-        };
-        if let Some(why) = Classes::of(corners, |c| attribute.outline_class(c)).reason() {
-            return parted(why, corners);
-        }
-        if attribute.is_miss(attribute.outline_class(&corners[0])) {
-            return if attribute.is_certainly_empty(self.pair, &self.cell) {
-                Verdict::Final(Kind::Empty)
-            } else if ends_discontinuities {
-                Verdict::Final(Kind::Traced(Reason::Guard))
-            } else {
-                Verdict::Split
-            };
-        }
-        if attribute.outline_within(&corners[0]).is_some() {
-            let outlines =
-                corners.each_ref().map(|c| attribute.outline_within(c).unwrap_or_else(|| c.clone()));
-            let by_outlines = self.smoothness(attribute, &outlines, parameters, |line| {
-                middle_sampled();
-                attribute.outline(line)
-            });
-            if by_outlines != Smoothness::Smooth {
-                return self.judged(by_outlines, attribute, corners, parameters);
-            }
-        }
-        self.finish(attribute, corners);
-        if let Some(why) = Classes::of(corners, |c| attribute.class(c)).reason() {
-            return parted(why, corners);
-        }
-        if attribute.is_told_by_outline(&corners[0]) {
-            return Verdict::Final(Kind::Smooth(()));
-        }
-        let smoothness = self.smoothness(attribute, corners, parameters, |line| {
-            middle_sampled();
-            attribute.sample(line)
-        });
-        self.judged(smoothness, attribute, corners, parameters)
-    }
-
-    fn judged<A: Attribute>(
-        &self,
-        smoothness: Smoothness,
-        attribute: &A,
-        corners: &mut Corners<A::Output>,
-        parameters: &Parameters,
-    ) -> Verdict {
-        match smoothness {
-            Smoothness::Smooth => Verdict::Final(Kind::Smooth(())),
-            Smoothness::Rough => Verdict::Split,
-            Smoothness::Wide => Verdict::Final(self.parted(attribute, corners, Reason::Angle, parameters)),
-        }
-    }
-
-    /// How a cell of one class is by how near to each other its corners are, and by the midpoint test: interpolated against exact
-    /// at the cell's centre.
-    fn smoothness<A: Attribute>(
-        &self,
-        attribute: &A,
-        corners: &Corners<A::Output>,
-        parameters: &Parameters,
-        exact: impl Fn(LinePoint) -> A::Output,
-    ) -> Smoothness {
-        let is_wide = spread_exceeds(attribute, corners.iter(), parameters.angular_threshold_deg);
-        match (is_wide, self.is_deepest(parameters)) {
-            (true, true) => return Smoothness::Wide,
-            // Smaller cells hold directions nearer to each other.
-            (true, false) => return Smoothness::Rough,
-            (false, true) => return Smoothness::Smooth,
-            (false, false) => {}
-        }
-        let middle = exact(self.line(self.cell.at([0.5; 4])));
-        let near = || interpolated(attribute, corners, [A::Real::of(0.5); 4]);
-        let is_near = attribute.class(&middle) == attribute.class(&corners[0])
-            && attribute.distance(&near(), &middle) <= parameters.distance_threshold;
-        if is_near { Smoothness::Smooth } else { Smoothness::Rough }
-    }
-}
-
-/// What the corners of a cell of one class say of the lines between.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Smoothness {
-    Smooth,
-    /// Halves may be smooth.
-    Rough,
-    /// Directions differ by more than the threshold, in a cell that has no halves.
-    Wide,
 }

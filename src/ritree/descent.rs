@@ -8,8 +8,9 @@
 use std::sync::atomic::Ordering;
 
 use super::attribute::Attribute;
-use super::cell::{Place, Verdict};
+use super::cell::Place;
 use super::interpolant::Corners;
+use super::look::Look;
 use super::node::Leaf;
 use super::{Answer, Cache, Reason, RiTree};
 use crate::linespace::{LinePoint, is_in_range};
@@ -26,9 +27,10 @@ pub struct Descent<'t, A: Attribute> {
 /// A cell that is kept nowhere else.
 struct Step<T> {
     place: Place,
-    /// Its corners and what they say. `None` if it is split unseen.
-    seen: Option<(Corners<T>, Verdict)>,
-    /// The corners of the other half of the cell above, which cost nothing more.
+    look: Look<T>,
+    /// Its corners, if they were those of a half of the cell above.
+    corners: Option<Corners<T>>,
+    /// The corners of the other half, which cost nothing more.
     beside: Option<Corners<T>>,
 }
 
@@ -101,7 +103,7 @@ impl<'t, A: Attribute> Descent<'t, A> {
         line: &LinePoint,
     ) -> (Answer<A::Output>, u32) {
         self.trail.clear();
-        self.push(start, corners.map(|corners| *corners), None);
+        self.push(start, corners, None);
         self.answer_along_trail(line)
     }
 
@@ -109,9 +111,10 @@ impl<'t, A: Attribute> Descent<'t, A> {
     fn answer_along_trail(&mut self, line: &LinePoint) -> (Answer<A::Output>, u32) {
         let mut at = self.trail.iter().rposition(|step| step.place.holds(line)).unwrap_or(0);
         loop {
-            let Step { place, seen, .. } = &self.trail[at];
-            if let Some((corners, Verdict::Final(kind))) = seen {
-                return (self.tree.answer(place, kind.map(|()| corners), line.stuv), place.depth);
+            let Step { place, look, .. } = &self.trail[at];
+            if let Look::Final(kind) = look {
+                let kind = kind.as_ref().map(|samples| &**samples);
+                return (self.tree.answer(place, kind, line.stuv), place.depth);
             }
             let side = place.side_of::<A::Real>(&line.stuv);
             self.turn_to(at, side);
@@ -123,18 +126,18 @@ impl<'t, A: Attribute> Descent<'t, A> {
     fn turn_to(&mut self, at: usize, side: usize) {
         let next = if self.trail.len() > at + 1 { Some(self.trail.swap_remove(at + 1)) } else { None };
         self.trail.truncate(at + 1);
-        let Step { place, seen, .. } = &self.trail[at];
+        let Step { place, look, .. } = &self.trail[at];
         let half = place.half(side);
-        match (next, seen) {
+        match (next, look) {
             // The way led to the other half, whose corners are there.
-            (Some(Step { seen: Some((corners, _)), beside: Some(wanted), .. }), _) => {
-                self.push(half, Some(wanted), Some(corners));
+            (Some(Step { corners: Some(corners), beside: Some(wanted), .. }), _) => {
+                self.push(half, Some(Box::new(wanted)), Some(corners));
                 return;
             }
-            (_, Some((corners, _))) if !self.tree.attribute.sampling().remembers => {
+            (_, Look::Split(Some(corners))) if !self.tree.attribute.sampling().remembers => {
                 let [lower, upper] = self.tree.split(place, corners);
                 let (wanted, other) = if side == 0 { (lower, upper) } else { (upper, lower) };
-                self.push(half, Some(wanted), Some(other));
+                self.push(half, Some(Box::new(wanted)), Some(other));
             }
             _ => self.push(half, None, None),
         }
@@ -142,14 +145,14 @@ impl<'t, A: Attribute> Descent<'t, A> {
     }
 
     /// Makes a cell the last step, with its corners if they are known.
-    fn push(&mut self, place: Place, known: Option<Corners<A::Output>>, beside: Option<Corners<A::Output>>) {
-        let tree = self.tree;
-        let look = |mut corners| {
-            let verdict = tree.verdict(&place, &mut corners);
-            (corners, verdict)
-        };
-        let seen =
-            tree.is_looked_at(&place).then(|| look(known.unwrap_or_else(|| tree.sample_corners(&place))));
-        self.trail.push(Step { place, seen, beside });
+    fn push(
+        &mut self,
+        place: Place,
+        corners: Option<Box<Corners<A::Output>>>,
+        beside: Option<Corners<A::Output>>,
+    ) {
+        let kept = beside.as_ref().and(corners.as_deref().cloned());
+        let look = self.tree.look(&place, corners);
+        self.trail.push(Step { place, look, corners: kept, beside });
     }
 }

@@ -23,10 +23,10 @@ impl Place {
             return Kind::Traced(why);
         }
         self.finish(attribute, corners);
-        let is_usable = |&class: &u32| {
-            usable(attribute, corners, class, parameters).is_ok_and(|usable| is_defined(&usable))
-        };
-        if may_be_located && sides.iter().any(is_usable) {
+        let usable = |&class: &u32| usable(attribute, corners, class, parameters).ok();
+        let located: Vec<_> = sides.iter().filter_map(usable).filter(|side| is_defined(side)).collect();
+        let are_joined = |side: &Vec<usize>| self.are_joined(attribute, corners, side.iter().copied());
+        if !located.is_empty() && located.iter().all(are_joined) {
             Kind::TwoClasses(())
         } else if may_hold_simplex(attribute, corners, |c| attribute.class(c)) {
             Kind::Parted((), why)
@@ -59,6 +59,19 @@ impl Place {
         };
         let fractions = self.cell.fractions(&stuv.map(A::Real::of));
         Simplex::all_around(fractions).find(fits).map(|simplex| simplex.interpolated(attribute, corners))
+    }
+
+    /// Whether the outputs of some corners, which hit and are of one class, lie side by side: all beside the first.
+    pub(super) fn are_joined<A: Attribute>(
+        &self,
+        attribute: &A,
+        corners: &Corners<A::Output>,
+        some: impl IntoIterator<Item = usize>,
+    ) -> bool {
+        let mut some = some.into_iter();
+        let Some(first) = some.next() else { return true };
+        let line = self.corner(first);
+        some.all(|bits| attribute.are_joined([line, self.corner(bits)], [&corners[first], &corners[bits]]))
     }
 
     /// The output of a line of a cell of two classes, interpolated from samples of its own, or why it is traced.

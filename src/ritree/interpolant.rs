@@ -7,19 +7,47 @@ use crate::geometry::Real;
 /// The outputs at the 16 corner lines of a cell, by the corner's bits (s, t, u, v from the lowest).
 pub type Corners<T> = [T; 16];
 
+/// The corners at the ends of the diagonal along which simplices lie.
+pub const DIAGONAL: [usize; 2] = [0, 15];
+
+/// What a final cell answers by.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Samples<T> {
+    /// The corners.
+    pub corners: Corners<T>,
+    /// The middle, where it was tested: it halves the diagonal that all simplices around it share.
+    pub middle: Option<Box<T>>,
+}
+
+impl<T> Samples<T> {
+    /// All of them.
+    pub fn all(&self) -> impl Iterator<Item = &T> {
+        self.corners.iter().chain(self.middle.as_deref())
+    }
+}
+
 /// The fewest samples that define a linear interpolant in 4-space (§2.5).
 const LINEAR_SAMPLES: usize = 5;
 
 /// The output at fractions of a cell of one class.
 pub fn interpolated<A: Attribute>(
     attribute: &A,
-    corners: &Corners<A::Output>,
+    samples: &Samples<A::Output>,
     fractions: [A::Real; 4],
 ) -> A::Output {
-    match attribute.sampling().scheme {
-        Scheme::Quadrilinear => quadrilinear(attribute, corners, fractions),
-        Scheme::Simplicial => Simplex::around(fractions, 0).interpolated(attribute, corners),
+    let corners = &samples.corners;
+    match (attribute.sampling().scheme, &samples.middle) {
+        (Scheme::Quadrilinear, _) => quadrilinear(attribute, corners, fractions),
+        (Scheme::Simplicial, None) => Simplex::around(fractions, 0).interpolated(attribute, corners),
+        (Scheme::Simplicial, Some(middle)) => {
+            Simplex::around(fractions, 0).interpolated_through(attribute, corners, middle)
+        }
     }
+}
+
+/// The output halfway between two.
+pub fn halfway<A: Attribute>(attribute: &A, ends: [&A::Output; 2]) -> A::Output {
+    attribute.interpolate(&ends.map(|end| (A::Real::of(0.5), end)))
 }
 
 /// How many of a cell's diagonals are different ones.
@@ -74,9 +102,29 @@ impl<R: Real> Simplex<R> {
         attribute: &A,
         corners: &Corners<A::Output>,
     ) -> A::Output {
-        let parts: [(R, &A::Output); 5] =
-            std::array::from_fn(|i| (self.weights[i], &corners[self.corners[i]]));
+        attribute.interpolate(&self.parts(corners))
+    }
+
+    /// The output at the line, where that in the middle of the cell is known: of the diagonal's two ends, the one on the far side of
+    /// the middle gives way to it. The largest errors are those along the diagonal, so that a third of all error goes.
+    fn interpolated_through<A: Attribute<Real = R>>(
+        &self,
+        attribute: &A,
+        corners: &Corners<A::Output>,
+        middle: &A::Output,
+    ) -> A::Output {
+        let mut parts = self.parts(corners);
+        let (near, far) = if parts[0].0 < parts[4].0 { (4, 0) } else { (0, 4) };
+        let less = parts[far].0;
+        parts[near].0 = parts[near].0 - less;
+        parts[far] = (less + less, middle);
+        // The middle may be known in outline only; the first is a corner, which is known whole.
+        parts.swap(1, far);
         attribute.interpolate(&parts)
+    }
+
+    fn parts<'c, T>(&self, corners: &'c Corners<T>) -> [(R, &'c T); 5] {
+        std::array::from_fn(|i| (self.weights[i], &corners[self.corners[i]]))
     }
 }
 
@@ -94,7 +142,7 @@ pub fn has_simplex(class_of: impl Fn(usize) -> Option<u32>) -> bool {
 
 /// Quadrilinear interpolation at fractions of the cell: bilinear in (u, v) within each directional group, the four
 /// corners that share (s, t), then bilinear in (s, t) (§2.4). As weights the two steps are one product.
-fn quadrilinear<A: Attribute>(
+pub fn quadrilinear<A: Attribute>(
     attribute: &A,
     corners: &Corners<A::Output>,
     fractions: [A::Real; 4],

@@ -1,7 +1,7 @@
 //! Trees as rows of records, to be kept from one run to the next.
 //!
 //! ```text
-//!   root: split ── half: split ── half: final, 16 corners          a record for each cell, in the order of a walk from the
+//!   root: split ── half: split ── half: final, its samples          a record for each cell, in the order of a walk from the
 //!               │              └─ half: unknown                    root; what is below a cell follows it
 //!               └─ half: final, …
 //! ```
@@ -15,8 +15,9 @@ use std::io::{self, Read, Write};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::cell::{Kind, Place, Verdict};
-use super::interpolant::Corners;
+use super::cell::{Kind, Place};
+use super::interpolant::Samples;
+use super::look::Look;
 use super::node::{self, Leaf, Node};
 use super::{Attribute, Cache, RiTree};
 use crate::linespace::PlanePair;
@@ -178,9 +179,9 @@ impl<A: Keepable> RiTree<A> {
                 return out.put(&Record::Final(leaf.kind()));
             }
             let Some(halves) = node.and_then(Node::halves) else {
-                return out.put(&Record::<&Corners<T>>::Unknown);
+                return out.put(&Record::<&Samples<T>>::Unknown);
             };
-            out.put(&Record::<&Corners<T>>::Split)?;
+            out.put(&Record::<&Samples<T>>::Split)?;
             halves.iter().try_for_each(|half| save(Some(half), out))
         }
         self.roots.iter().try_for_each(|root| save(root.get().map(|node| &**node), out))
@@ -214,7 +215,7 @@ impl<A: Keepable> RiTree<A> {
         cache: &Cache,
         loaded: &mut Loaded,
     ) -> Result<(), Unreadable> {
-        match from.take::<Record<Box<Corners<A::Output>>>>()? {
+        match from.take::<Record<Box<Samples<A::Output>>>>()? {
             Record::Unknown => Ok(()),
             Record::Split => {
                 if place.is_deepest(&self.parameters) {
@@ -228,16 +229,16 @@ impl<A: Keepable> RiTree<A> {
                 })
             }
             Record::Final(kind) => {
-                let mut kept = kind.corners().into_iter().flat_map(|corners| corners.iter());
-                if !kept.all(|output| self.attribute.is_sound(output)) {
+                let is_sound =
+                    |samples: &Samples<_>| samples.all().all(|output| self.attribute.is_sound(output));
+                if kind.samples().is_some_and(|samples| !is_sound(samples)) {
                     return Err(Unreadable::damaged("a sample is not finite"));
                 }
                 let node = node.filter(|_| cache.reserve(node::leaf_bytes(&kind)));
                 if loaded.count(node.is_some()) {
                     // A look at what was read is none of what growing the tree takes.
-                    let (sampled, verdict) = place.anew(&self.attribute, &self.parameters);
-                    let is_same = kind.corners().is_none_or(|corners| **corners == sampled);
-                    if !is_same || verdict != Verdict::Final(kind.bare()) {
+                    let anew = place.look(&self.attribute, &self.parameters, None, |_| ());
+                    if anew != Look::Final(kind.clone()) {
                         return Err(Unreadable::damaged("a cell is not what this program makes of it"));
                     }
                 }

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! That is the paper's way. An [attribute](Attribute::sampling) may have cells looked at on every fourth level only, and lines
-//! interpolated in the simplex that holds them.
+//! interpolated in the simplex that holds them: then the ends and the middle of a cell's diagonal mostly say that it is to be split.
 //!
 //! **The law:** what becomes of a cell is a pure function of the cell. So the answer to a line depends neither on the
 //! order of queries, nor on threads, nor on what the cache still holds; where the cache has no room, the cells on the
@@ -27,6 +27,7 @@ mod discontinuity;
 mod fitted;
 mod interpolant;
 pub mod kept;
+mod look;
 mod node;
 mod stats;
 #[cfg(test)]
@@ -45,8 +46,9 @@ pub use stats::{BuildCounts, TreeShape};
 
 use crate::geometry::Real;
 use crate::linespace::{LinePoint, PlanePair};
-use cell::{Kind, Verdict};
-use interpolant::{Corners, interpolated};
+use cell::Kind;
+use interpolant::{Corners, Samples, interpolated};
+use look::Look;
 use node::Node;
 use stats::BuildCounters;
 
@@ -136,28 +138,26 @@ impl<A: Attribute> RiTree<A> {
         root.get().map(|node| &**node)
     }
 
-    fn answer(&self, place: &Place, kind: Kind<&Corners<A::Output>>, stuv: [f64; 4]) -> Answer<A::Output> {
-        let by_simplex = |corners| place.of_simplex(&self.attribute, corners, stuv, &self.parameters);
+    fn answer(&self, place: &Place, kind: Kind<&Samples<A::Output>>, stuv: [f64; 4]) -> Answer<A::Output> {
+        let by_simplex = |samples: &Samples<_>| {
+            place.of_simplex(&self.attribute, &samples.corners, stuv, &self.parameters)
+        };
         match kind {
             Kind::Empty => Answer::Interpolated(self.attribute.miss()),
-            Kind::Smooth(corners) => {
+            Kind::Smooth(samples) => {
                 let fractions = place.cell.fractions(&stuv.map(A::Real::of));
-                Answer::Interpolated(interpolated(&self.attribute, corners, fractions))
+                Answer::Interpolated(interpolated(&self.attribute, samples, fractions))
             }
-            Kind::TwoClasses(corners) => {
-                let by_class = || place.of_own_class(&self.attribute, corners, stuv, &self.parameters);
-                by_simplex(corners).map_or_else(by_class, Ok).map_or_else(Answer::Trace, Answer::Interpolated)
+            Kind::TwoClasses(samples) => {
+                let by_class =
+                    || place.of_own_class(&self.attribute, &samples.corners, stuv, &self.parameters);
+                by_simplex(samples).map_or_else(by_class, Ok).map_or_else(Answer::Trace, Answer::Interpolated)
             }
             Kind::Traced(reason) => Answer::Trace(reason),
-            Kind::Parted(corners, reason) => {
-                by_simplex(corners).map_or(Answer::Trace(reason), Answer::Interpolated)
+            Kind::Parted(samples, reason) => {
+                by_simplex(samples).map_or(Answer::Trace(reason), Answer::Interpolated)
             }
         }
-    }
-
-    fn sample_corners(&self, place: &Place) -> Corners<A::Output> {
-        self.counters.sampled(16, 0);
-        place.sample(&self.attribute)
     }
 
     fn split(&self, place: &Place, corners: &Corners<A::Output>) -> [Corners<A::Output>; 2] {
@@ -165,13 +165,9 @@ impl<A: Attribute> RiTree<A> {
         place.split(&self.attribute, corners)
     }
 
-    fn is_looked_at(&self, place: &Place) -> bool {
-        place.is_looked_at(&self.attribute, &self.parameters)
-    }
-
-    fn verdict(&self, place: &Place, corners: &mut Corners<A::Output>) -> Verdict {
-        let middle_sampled = || self.counters.sampled(1, 0);
-        place.verdict(&self.attribute, corners, &self.parameters, middle_sampled)
+    /// See [`Place::look`].
+    fn look(&self, place: &Place, known: Option<Box<Corners<A::Output>>>) -> Look<A::Output> {
+        place.look(&self.attribute, &self.parameters, known, |lines| self.counters.sampled(lines, 0))
     }
 
     /// Lets time pass for the least-recently-used rule; call it now and then, such as once per tile of rays.

@@ -7,8 +7,9 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use super::RiTree;
 use super::attribute::Attribute;
 use super::cache::Cache;
-use super::cell::{Kind, Place, Verdict};
-use super::interpolant::Corners;
+use super::cell::{Kind, Place};
+use super::interpolant::{Corners, Samples};
+use super::look::Look;
 use super::stats::TreeShape;
 
 /// A cell of the tree. A node that holds neither leaf nor halves nor corners was pruned, or never looked at.
@@ -30,19 +31,19 @@ impl<T> Default for Node<T> {
     }
 }
 
-/// A final cell, with corners where it answers by them.
+/// A final cell, with samples where it answers by them.
 pub struct Leaf<T> {
-    kind: Kind<Box<Corners<T>>>,
+    kind: Kind<Box<Samples<T>>>,
     stamp: AtomicU32,
 }
 
 impl<T> Leaf<T> {
-    pub fn new(kind: Kind<Box<Corners<T>>>, stamp: u32) -> Self {
+    pub fn new(kind: Kind<Box<Samples<T>>>, stamp: u32) -> Self {
         Self { kind, stamp: AtomicU32::new(stamp) }
     }
 
-    pub fn kind(&self) -> Kind<&Corners<T>> {
-        self.kind.as_ref().map(|corners| &**corners)
+    pub fn kind(&self) -> Kind<&Samples<T>> {
+        self.kind.as_ref().map(|samples| &**samples)
     }
 
     /// Bytes beside its node.
@@ -59,8 +60,14 @@ impl<T> Leaf<T> {
 }
 
 /// The bytes of a leaf beside its node.
-pub fn leaf_bytes<T>(kind: &Kind<Box<Corners<T>>>) -> usize {
-    kind.corners().map_or(0, |_| size_of::<Corners<T>>())
+pub fn leaf_bytes<T>(kind: &Kind<Box<Samples<T>>>) -> usize {
+    let of_middle = |samples: &Samples<T>| samples.middle.as_ref().map_or(0, |_| size_of::<T>());
+    kind.samples().map_or(0, |samples| size_of::<Samples<T>>() + of_middle(samples))
+}
+
+/// The most that a leaf may hold.
+const fn most_leaf_bytes<T>() -> usize {
+    size_of::<Samples<T>>() + size_of::<T>()
 }
 
 /// The bytes of `n` nodes.
@@ -129,28 +136,22 @@ impl<T: Clone + Send + Sync> Node<T> {
         // Corners of halves wait, unless they are sampled again sooner than kept.
         let waiting = if tree.attribute.sampling().remembers { 0 } else { 2 * of_corners };
         // Room for the larger outcome is taken first; what is not needed is given back.
-        let room = of_corners.max(bytes::<T>(2) + waiting);
+        let room = most_leaf_bytes::<T>().max(bytes::<T>(2) + waiting);
         if !cache.reserve(room) {
             return Err(guard.clone());
         }
-        let (below, kept) = if tree.is_looked_at(place) {
-            let mut corners = guard.take().unwrap_or_else(|| Box::new(tree.sample_corners(place)));
-            match tree.verdict(place, &mut corners) {
-                Verdict::Final(kind) => {
-                    let leaf = Leaf::new(kind.map(|()| corners), tree.clock.load(Ordering::Relaxed));
-                    let kept = leaf.bytes();
-                    (Below::Leaf(leaf), kept)
-                }
-                Verdict::Split if waiting == 0 => (Below::Halves(Box::default()), bytes::<T>(2)),
-                Verdict::Split => {
-                    let half =
-                        |corners| Self { corners: Mutex::new(Some(Box::new(corners))), ..Self::default() };
-                    let halves = tree.split(place, &corners).map(half);
-                    (Below::Halves(Box::new(halves)), bytes::<T>(2) + waiting)
-                }
+        let (below, kept) = match tree.look(place, guard.take()) {
+            Look::Final(kind) => {
+                let leaf = Leaf::new(kind, tree.clock.load(Ordering::Relaxed));
+                let kept = leaf.bytes();
+                (Below::Leaf(leaf), kept)
             }
-        } else {
-            (Below::Halves(Box::default()), bytes::<T>(2))
+            Look::Split(Some(corners)) if waiting > 0 => {
+                let half = |corners| Self { corners: Mutex::new(Some(Box::new(corners))), ..Self::default() };
+                let halves = tree.split(place, &corners).map(half);
+                (Below::Halves(Box::new(halves)), bytes::<T>(2) + waiting)
+            }
+            Look::Split(_) => (Below::Halves(Box::default()), bytes::<T>(2)),
         };
         let _ = self.below.set(below);
         tree.counters.expanded();
@@ -203,29 +204,34 @@ impl<T: Clone + Send + Sync> Node<T> {
         A: Attribute<Output = T>,
         T: PartialEq + std::fmt::Debug,
     {
-        let (sampled, verdict) = place.anew(&tree.attribute, &tree.parameters);
-        // Corners are finished as the cells need that they came through.
-        let finished = |corners: &Corners<T>| {
-            let mut corners = corners.clone();
-            place.finish(&tree.attribute, &mut corners);
-            corners
-        };
+        let anew = tree.look(place, None);
         if let Some(leaf) = self.leaf() {
             assert!(self.lock().is_none(), "a final leaf holds only its own corners");
-            if let Some(corners) = leaf.kind.corners() {
-                assert_eq!(finished(corners), finished(&sampled), "stored corners are their lines' samples");
-            }
-            assert_eq!(Verdict::Final(leaf.kind.bare()), verdict, "a final leaf is final");
+            assert_eq!(
+                Look::Final(leaf.kind.clone()),
+                anew,
+                "a final leaf is final, and stored samples are their lines'"
+            );
             return leaf.bytes();
         }
         if let Some(halves) = self.halves() {
             assert!(self.lock().is_none(), "a split node keeps no corners");
-            assert_eq!(verdict, Verdict::Split, "only cells that must are split");
+            assert!(matches!(anew, Look::Split(_)), "only cells that must are split");
             let inside = |side: usize| halves[side].check(&place.half(side), tree);
             return bytes::<T>(2) + inside(0) + inside(1);
         }
         self.lock().as_ref().map_or(0, |corners| {
-            assert_eq!(finished(corners), finished(&sampled), "waiting corners are their lines' samples");
+            // Which of them are finished depends on the cells that they came through.
+            let finished = |mut corners: Corners<T>| {
+                place.finish(&tree.attribute, &mut corners);
+                corners
+            };
+            let sampled = place.sample(&tree.attribute);
+            assert_eq!(
+                finished((**corners).clone()),
+                finished(sampled),
+                "waiting corners are their lines' samples"
+            );
             size_of::<Corners<T>>()
         })
     }

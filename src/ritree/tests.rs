@@ -1,6 +1,7 @@
 //! The tree against attributes whose answers are known in closed form.
 
 mod keeping;
+mod simplicial;
 
 use std::sync::atomic::AtomicU64;
 
@@ -262,67 +263,6 @@ fn lines_of_a_mixed_cell_are_traced_if_their_side_cannot_be_told_cheaply() {
         traced
     };
     assert!(traced(false) > 2 * traced(true));
-}
-
-const SIMPLICIAL: Sampling = Sampling { scheme: Scheme::Simplicial, parts: true, ..Sampling::PAPER };
-
-#[test]
-fn beside_a_discontinuity_lines_are_interpolated_that_a_simplex_of_one_class_holds() {
-    let answers = |sampling| {
-        let tree = RiTree::new(Test { sampling, ..step(false) }, settings(0.01, 8));
-        let (cache, mut interpolated) = (roomy(), 0);
-        for point in points(6, 3_000) {
-            match tree.query(point, &cache) {
-                Some(Answer::Interpolated(sample)) => {
-                    let error = sample.value - tree.attribute().exact(point.stuv);
-                    assert!(error.abs() < 1e-9, "{point:?}: {error}, bled over the step");
-                    interpolated += 1;
-                }
-                Some(Answer::Trace(Reason::Silhouette)) => {}
-                other => panic!("{other:?}"),
-            }
-        }
-        tree.check_invariants();
-        interpolated
-    };
-    let (cells, simplices) = (answers(Sampling::PAPER), answers(SIMPLICIAL));
-    assert!(simplices > cells + 500, "{simplices}, without simplices {cells}");
-}
-
-#[test]
-fn directions_too_far_apart_in_a_cell_may_be_near_in_a_simplex() {
-    // Turned by 24° over the cell's side, but by twice that from corner to corner.
-    let turning = |sampling| Test { sampling, turns: 0.28, ..Test::smooth(|[s, t, ..]| s + t) };
-    let answer = |sampling, at| {
-        let tree = RiTree::new(turning(sampling), settings(0.01, 4));
-        let answer = tree.query(LinePoint { pair: PlanePair::ALL[0], stuv: at }, &roomy());
-        tree.check_invariants();
-        answer
-    };
-    // Along the diagonal from (s, t) = (1, 0) to (0, 1) directions are the same.
-    let (between, at) = (interpolated(answer(SIMPLICIAL, [0.8, -0.7, 0.3, 0.3])), Reason::Angle);
-    assert!((between - 0.1).abs() < 1e-12, "{between}");
-    assert_eq!(answer(Sampling::PAPER, [0.8, -0.7, 0.3, 0.3]), Some(Answer::Trace(at)));
-}
-
-#[test]
-fn cells_that_are_not_looked_at_are_split_unseen() {
-    let sampling = Sampling { levels_per_look: 4, levels_spared: 2, remembers: true, ..SIMPLICIAL };
-    for attribute in [Test::smooth(|[s, t, u, v]| (s + 2.0 * t).sin() + u * v * v), step(true)] {
-        let tree =
-            |cache| (RiTree::new(Test { sampling, ..attribute }, settings(0.05, 11)), Cache::new(cache));
-        let trees = [1 << 30, 30_000, 0].map(tree);
-        for point in points(7, 2_000) {
-            let [roomy, small, none] = trees.each_ref().map(|(tree, cache)| tree.query(point, cache));
-            assert!(roomy == small && roomy == none, "{point:?}");
-        }
-        let by_depth = trees[0].0.shape().leaves_by_depth;
-        let is_looked_at = |depth: usize| depth == 9 || (11 - depth).is_multiple_of(4);
-        let is_right = |(depth, n): (usize, &u64)| *n == 0 || is_looked_at(depth);
-        assert!(by_depth.iter().enumerate().all(is_right), "{by_depth:?}");
-        assert!(by_depth[7] > 0 && by_depth.len() > 8, "{by_depth:?}");
-        trees.iter().for_each(|(tree, _)| assert!(tree.check_invariants() <= 1 << 30));
-    }
 }
 
 #[test]

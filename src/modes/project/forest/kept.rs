@@ -27,7 +27,7 @@ use crate::ritree::{Cache, Loaded, Parameters, Unreadable};
 pub const TREES_BEGIN: [u8; 16] = *b"chordfield trees";
 
 /// To be raised with every change of the format, and of what becomes of a cell.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 
 /// Bytes before the first record: magic, version and length.
 const HEAD: u64 = 28;
