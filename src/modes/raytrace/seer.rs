@@ -12,7 +12,7 @@ use crate::linespace::{LinePoint, is_in_range};
 use crate::ritree::{Answer, BuildCounts, Cache, Descent, Parameters, Reason, RiTree};
 use crate::scene::trace::{Material, Object, World};
 use crate::surface::optics::{Optics, follow};
-use crate::surface::{Hit, Reach, steady_gap};
+use crate::surface::{Hit, Reach, Surface, steady_gap};
 
 /// Highlights below this share of their light are not seen: a third of the least step of eight bits, in the dark.
 const LEAST_HIGHLIGHT: f64 = 1e-4;
@@ -102,6 +102,12 @@ impl<'a, R: Real> Seer<'a, R> {
     /// Its material.
     pub fn material(&self) -> &Material {
         &self.object.material
+    }
+
+    /// Whether it mirrors rays at planes only.
+    pub fn is_flat(&self) -> bool {
+        matches!(self.object.surface, Surface::Disc(_) | Surface::Block(_))
+            && self.optics == Some(Optics::Mirror)
     }
 
     /// Whether it has a tree.

@@ -53,6 +53,20 @@ fn pictures_are_the_same_bits_for_any_cache_and_number_of_threads() {
 }
 
 #[test]
+fn rays_that_planes_alone_have_turned_ask_trees() {
+    let recipe = Recipe { seed: 1, count: 4 };
+    let asked = |table_mirrors| {
+        let mut world = open("tomatoes", recipe).expect("a world");
+        world.objects[0].material.mirror *= f64::from(table_mirrors);
+        let (exact, near) = (picture(&world, Tracing::Exact), picture(&world, trees(0.02)));
+        assert!(exact.mean_distance(&near).expect("one size") < 0.01);
+        near.work().queries
+    };
+    let (with, without) = (asked(1), asked(0));
+    assert!(with > without + 50, "{with}, without a mirror {without}");
+}
+
+#[test]
 fn what_trees_tell_has_directions_of_unit_length() {
     let mut turned = 0;
     for world in worlds() {
