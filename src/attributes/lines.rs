@@ -162,9 +162,9 @@ impl<'a> SurfaceLines<'a> {
 
     /// Whether the places where two lines of one pair hit, told by their depths and unit normals, lie side by side on the
     /// surface and not on two parts of it, one behind the other: the way between them runs across the normals' mean. Of places on a
-    /// sphere it does exactly.
+    /// sphere it does exactly. The normals of meshes are not those of their faces, and say nothing of it.
     pub(super) fn are_joined<R: Real>(&self, lines: [LinePoint; 2], seen: [&Seen; 2]) -> bool {
-        if self.is_convex {
+        if self.is_convex || matches!(self.surface, Surface::Mesh(_)) {
             return true;
         }
         let [a, b] = [0, 1].map(|i| self.place_of::<R>(&lines[i], seen[i].depth));
@@ -174,7 +174,8 @@ impl<'a> SurfaceLines<'a> {
         let mean = Vec3::new(mean.axis(i), mean.axis(j), mean.axis(k));
         let way = b - a;
         let along = way.dot(mean);
-        (along * along).get() <= JOINED_SINE * JOINED_SINE * (way.dot(way) * mean.dot(mean)).get()
+        let room = R::of(JOINED_SINE * JOINED_SINE) * way.dot(way) + R::of(DEPTH_NOISE * DEPTH_NOISE);
+        along * along <= room * mean.dot(mean)
     }
 
     /// Where a line is at a depth, from the middle: across the axis and along it, box units.
@@ -219,6 +220,9 @@ const SLOPE_SCALE: f64 = 0.75;
 /// Places of one class are [side by side](SurfaceLines::are_joined) if the way between them is no steeper on the mean of the surface
 /// than by this sine.
 const JOINED_SINE: f64 = 0.05;
+
+/// What the way may be off the surface by all the same, box units: samples know depths as f32.
+const DEPTH_NOISE: f64 = 4.0 * f32::EPSILON as f64;
 
 /// No body counts as thinner than this share of its longest side: normals and exit rays may depend on the slope alone.
 const LEAST_FLATNESS: f64 = 1.0 / 4.0;

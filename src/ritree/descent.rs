@@ -151,7 +151,7 @@ impl<'t, A: Attribute> Descent<'t, A> {
         corners: Option<Box<Corners<A::Output>>>,
         beside: Option<Corners<A::Output>>,
     ) {
-        let kept = beside.as_ref().and(corners.as_deref().cloned());
+        let kept = beside.as_ref().and_then(|_| corners.as_deref().cloned());
         let look = self.tree.look(&place, corners);
         self.trail.push(Step { place, look, corners: kept, beside });
     }

@@ -27,7 +27,7 @@ enum Verdict {
 /// What the corners of a cell of one class say of the lines between.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Smoothness<T> {
-    /// They may be interpolated. With the middle's sample, if it was tested.
+    /// They may be interpolated. With the middle's sample, if that helps.
     Smooth(Option<T>),
     /// Halves may be smooth.
     Rough,
@@ -92,24 +92,31 @@ impl Place {
         if both_miss || from != to {
             return split;
         }
+        // Where all corners are looked at, the middle is asked for again, and counted then.
+        let mut middles = 0;
         if let [Some(from), Some(to)] = ends.each_ref().map(|end| attribute.outline_within(end)) {
-            sampled(1);
+            middles = 1;
             let middle = attribute.outline(self.middle());
             if !is_near(attribute, halfway(attribute, [&from, &to]), &middle, parameters) {
+                sampled(middles);
                 return split;
             }
         }
         DIAGONAL.iter().zip(&mut ends).for_each(|(bits, end)| attribute.finish(self.corner(*bits), end));
         let [from, to] = &ends;
         if attribute.class(from) != attribute.class(to) {
+            sampled(middles);
             return split;
         }
         if attribute.is_told_by_outline(from) {
             return None;
         }
-        sampled(1);
         let middle = attribute.sample(self.middle());
-        if is_near(attribute, halfway(attribute, [from, to]), &middle, parameters) { None } else { split }
+        if is_near(attribute, halfway(attribute, [from, to]), &middle, parameters) {
+            return None;
+        }
+        sampled(1);
+        split
     }
 
     /// What is to be done with the cell, and §2.5 for its kind. Its corners are finished if that tells it.
@@ -198,9 +205,10 @@ impl Place {
             Scheme::Quadrilinear => quadrilinear(attribute, corners, [A::Real::of(0.5); 4]),
             Scheme::Simplicial => halfway(attribute, DIAGONAL.map(|bits| &corners[bits])),
         };
-        match is_near(attribute, told, &middle, parameters) {
-            true => Smoothness::Smooth(Some(middle)),
-            false => Smoothness::Rough,
+        match (is_near(attribute, told, &middle, parameters), attribute.sampling().scheme) {
+            (false, _) => Smoothness::Rough,
+            (true, Scheme::Quadrilinear) => Smoothness::Smooth(None),
+            (true, Scheme::Simplicial) => Smoothness::Smooth(Some(middle)),
         }
     }
 }

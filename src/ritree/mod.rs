@@ -55,7 +55,8 @@ use stats::BuildCounters;
 /// The tree's settings; the defaults are the paper's.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Parameters {
-    /// A cell splits if its middle is interpolated worse than this, in the attribute's own distance.
+    /// A cell splits if it is interpolated worse than this, in the attribute's own distance: in its middle, or where simplices go
+    /// through the middle three quarters of how far they would be off there.
     pub distance_threshold: f64,
     /// Directions farther apart than this are not interpolated, degrees.
     pub angular_threshold_deg: f64,

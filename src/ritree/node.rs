@@ -204,7 +204,7 @@ impl<T: Clone + Send + Sync> Node<T> {
         A: Attribute<Output = T>,
         T: PartialEq + std::fmt::Debug,
     {
-        let anew = tree.look(place, None);
+        let anew = place.look(&tree.attribute, &tree.parameters, None, |_| ());
         if let Some(leaf) = self.leaf() {
             assert!(self.lock().is_none(), "a final leaf holds only its own corners");
             assert_eq!(

@@ -1,6 +1,14 @@
 //! Trees that are looked at on some levels only and interpolate in simplices.
 
+use glam::DVec3;
+
 use super::*;
+use crate::attributes::exit_ray::ExitRay;
+use crate::attributes::lines::{ByDirection, SurfaceLines};
+use crate::attributes::smooth_chord::SmoothChords;
+use crate::attributes::surface::FirstHit;
+use crate::surface::optics::Optics;
+use crate::surface::{Shell, Sphere, Surface, lattice_patches};
 
 const SIMPLICIAL: Sampling = Sampling { scheme: Scheme::Simplicial, parts: true, ..Sampling::PAPER };
 
@@ -60,50 +68,94 @@ fn simplices_go_through_the_middle_that_was_tested() {
             greatest = greatest.max(error);
         }
         assert!(greatest > 0.7 * worst, "{greatest} of {worst}");
-        let middle = LinePoint { pair: PlanePair::ALL[0], stuv: [0.5; 4] };
+        // The middle of a cell of that depth.
+        let middle = LinePoint { pair: PlanePair::ALL[0], stuv: [-1.0 + 0.5 * side; 4] };
         let told = interpolated(tree.query(middle, &cache));
         assert!((told - square(middle.stuv)).abs() < 1e-12, "{told}");
         tree.check_invariants();
     }
 }
 
+/// Holds what cells on the way to lines say, asked by the diagonal first, against what all of their corners say. Returns how many
+/// cells were looked at, and of how many the diagonal told it.
+fn looked_at<A: Attribute<Output: PartialEq + std::fmt::Debug>>(
+    attribute: &A,
+    parameters: &Parameters,
+    lines: &[LinePoint],
+) -> (u64, u64) {
+    let (mut seen, mut sooner) = (0, 0);
+    for line in lines {
+        let mut place = Place::root(line.pair);
+        loop {
+            let sampled = AtomicU64::new(0);
+            let count = |lines| {
+                sampled.fetch_add(lines, Ordering::Relaxed);
+            };
+            let look = place.look(attribute, parameters, None, count);
+            // Corners that are known are all looked at.
+            let known = Box::new(place.sample(attribute));
+            let of_all = place.look(attribute, parameters, Some(known), |_| ());
+            let is_same = match (&look, &of_all) {
+                (Look::Split(_), Look::Split(_)) => true,
+                (look, of_all) => look == of_all,
+            };
+            assert!(is_same, "{place:?}: {look:?}, by all corners {of_all:?}");
+            if place.is_looked_at(attribute, parameters) {
+                seen += 1;
+                sooner += u64::from(sampled.into_inner() < 16);
+            }
+            if matches!(look, Look::Final(_)) {
+                break;
+            }
+            place = place.half(place.side_of::<f64>(&line.stuv));
+        }
+    }
+    (seen, sooner)
+}
+
 #[test]
 fn a_diagonal_says_no_more_than_all_corners() {
-    // Corners that are known are all looked at; those that are not, by the diagonal first.
     let sampling = Sampling { levels_per_look: 4, levels_spared: 2, remembers: true, ..SIMPLICIAL };
     let empty = |[s, t, ..]: [f64; 4]| if s + t > 3.5 { 1 } else { MISS };
     let smooth = Test::smooth(|[s, t, u, v]| (s + 2.0 * t).sin() + u * v * v);
     let small = Test { class: empty, ..Test::smooth(|_| 1.0) };
     let turning = Test { turns: 0.28, ..Test::smooth(|[s, t, ..]| s + t) };
-    for attribute in [smooth, small, turning, step(true), step(false)] {
-        let attribute = Test { sampling, ..attribute };
-        let parameters = settings(0.05, 11);
-        let (mut sooner, mut seen) = (0, 0);
-        for point in points(9, 300) {
-            let mut place = Place::root(point.pair);
-            while place.depth < 11 {
-                let sampled = AtomicU64::new(0);
-                let count = |lines| {
-                    sampled.fetch_add(lines, Ordering::Relaxed);
-                };
-                let look = place.look(&attribute, &parameters, None, count);
-                let known = Box::new(place.sample(&attribute));
-                let of_all = place.look(&attribute, &parameters, Some(known), |_| ());
-                let same = match (&look, &of_all) {
-                    (Look::Split(_), Look::Split(_)) => true,
-                    (look, of_all) => look == of_all,
-                };
-                assert!(same, "{place:?}: {look:?}, by all corners {of_all:?}");
-                sooner += u64::from(sampled.into_inner() < 16);
-                seen += u64::from(place.is_looked_at(&attribute, &parameters));
-                if matches!(look, Look::Final(_)) {
-                    break;
-                }
-                place = place.half(place.side_of::<f64>(&point.stuv));
-            }
-        }
-        assert!(sooner > seen / 4, "{sooner} of {seen}");
+    let told = [smooth, small, turning, step(true), step(false)]
+        .map(|attribute| looked_at(&Test { sampling, ..attribute }, &settings(0.05, 11), &points(9, 300)));
+    let [seen, sooner] = told.into_iter().fold([0; 2], |sum, told| [sum[0] + told.0, sum[1] + told.1]);
+    assert!(told.iter().all(|told| told.0 >= 300) && sooner > seen / 4, "{sooner} of {seen}: {told:?}");
+}
+
+#[test]
+fn a_diagonal_says_no_more_of_mirrors_and_glass() {
+    let sheet = lattice_patches(&sheet_lattice()).into_iter().map(|patch| (patch, 1)).collect();
+    let sheet = Surface::Shell(Shell::new(sheet).expect("patches"));
+    let ball = Surface::Sphere(Sphere::new(DVec3::splat(3.0), 2.0).expect("a sphere"));
+    let (parameters, glass) = (settings(0.05, 24), Optics::Glass { index: 1.4 });
+    for (surface, is_convex) in [(&sheet, false), (&ball, true)] {
+        let lines = |by_direction| SurfaceLines::new(surface, is_convex, by_direction).expect("an extent");
+        // Lines that meet the middle of the box, at most of its places.
+        let mut asked = points(10, 60);
+        asked.iter_mut().for_each(|line| line.stuv = line.stuv.map(|x| 0.5 + 0.2 * (x - 0.5)));
+        let told = [
+            looked_at(&FirstHit::<f64>::new(lines(ByDirection::Little)), &parameters, &asked),
+            looked_at(
+                &ExitRay::<f64>::new(lines(ByDirection::Little), Optics::Mirror, 8, 50.0),
+                &parameters,
+                &asked,
+            ),
+            looked_at(&ExitRay::<f64>::new(lines(ByDirection::Much), glass, 8, 50.0), &parameters, &asked),
+        ];
+        assert!(told.iter().all(|&(seen, sooner)| seen > 100 && sooner > seen / 4), "{told:?}");
     }
+    let chords = SmoothChords::<f64>::new(&ball).expect("an extent");
+    let (seen, sooner) = looked_at(&chords, &parameters, &points(11, 60));
+    assert!(seen > 60 && sooner > 0, "{sooner} of {seen}");
+}
+
+fn sheet_lattice() -> Vec<Vec<DVec3>> {
+    let wave = |i: i32, j: i32| 0.3 * f64::from(i * i - 2 * j).sin();
+    (0..6).map(|i| (0..6).map(|j| DVec3::new(f64::from(i), f64::from(j), wave(i, j))).collect()).collect()
 }
 
 #[test]
