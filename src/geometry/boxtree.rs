@@ -53,7 +53,7 @@ impl BoxTree {
     pub fn build(boxes: &[Bounds]) -> Self {
         let mut items: Vec<u32> = (0..boxes.len() as u32).collect();
         let mut nodes = Vec::with_capacity(boxes.len());
-        split(boxes, &mut items, 0, 0, &mut nodes);
+        split(boxes, &mut items, 0, 0, PARALLEL_ITEMS, &mut nodes);
         Self { nodes, items }
     }
 
@@ -189,7 +189,15 @@ impl BoxTree {
 /// Items from which on the two sides of a split are built at the same time.
 const PARALLEL_ITEMS: usize = 4096;
 
-fn split(boxes: &[Bounds], items: &mut [u32], first: usize, depth: usize, nodes: &mut Vec<Node>) {
+/// `parallel` is from how many items on it uses two threads.
+fn split(
+    boxes: &[Bounds],
+    items: &mut [u32],
+    first: usize,
+    depth: usize,
+    parallel: usize,
+    nodes: &mut Vec<Node>,
+) {
     if items.is_empty() {
         return;
     }
@@ -200,14 +208,14 @@ fn split(boxes: &[Bounds], items: &mut [u32], first: usize, depth: usize, nodes:
         return;
     }
     nodes[index].count = 0;
-    let is_long = items.len() >= PARALLEL_ITEMS;
+    let is_long = items.len() >= parallel;
     let middle = partition(boxes, items, depth < COST_SPLITS);
     let (left, right) = items.split_at_mut(middle);
     if is_long {
         let mut of_right = Vec::with_capacity(right.len());
         rayon::join(
-            || split(boxes, left, first, depth + 1, nodes),
-            || split(boxes, right, first + middle, depth + 1, &mut of_right),
+            || split(boxes, left, first, depth + 1, parallel, nodes),
+            || split(boxes, right, first + middle, depth + 1, parallel, &mut of_right),
         );
         // Those of the right side counted from 0.
         let offset = nodes.len() as u32;
@@ -217,9 +225,9 @@ fn split(boxes: &[Bounds], items: &mut [u32], first: usize, depth: usize, nodes:
             _ => node,
         }));
     } else {
-        split(boxes, left, first, depth + 1, nodes);
+        split(boxes, left, first, depth + 1, parallel, nodes);
         nodes[index].start = nodes.len() as u32;
-        split(boxes, right, first + middle, depth + 1, nodes);
+        split(boxes, right, first + middle, depth + 1, parallel, nodes);
     }
 }
 
@@ -334,22 +342,18 @@ mod tests {
     }
 
     #[test]
-    fn hierarchies_of_many_boxes_are_those_of_few_built_one_after_the_other() {
-        let boxes = random_boxes(4, 3 * PARALLEL_ITEMS);
-        let tree = BoxTree::build(&boxes);
-        let mut seen = vec![0; boxes.len()];
-        tree.items_under(0).iter().for_each(|&i| seen[i as usize] += 1);
-        assert!(seen.iter().all(|&times| times == 1));
-        for node in 0..tree.nodes.len() as u32 {
-            let inside =
-                tree.items_under(node).iter().fold(Bounds::EMPTY, |b, &i| b.union(boxes[i as usize]));
-            assert_eq!(tree.bounds_of(node), inside, "node {node}");
+    fn two_threads_build_what_one_builds() {
+        let boxes = random_boxes(4, 2_000);
+        let build = |parallel| {
+            let (mut items, mut nodes): (Vec<u32>, _) = ((0..2_000).collect(), Vec::new());
+            split(&boxes, &mut items, 0, 0, parallel, &mut nodes);
+            let told: Vec<_> = nodes.iter().map(|node| (node.bounds, node.start, node.count)).collect();
+            (items, told)
+        };
+        let alone = build(usize::MAX);
+        for parallel in [2, 50, 1_500] {
+            assert!(build(parallel) == alone, "{parallel}");
         }
-        // One thread builds the same nodes.
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
-        let alone = pool.install(|| BoxTree::build(&boxes));
-        let told = |tree: &BoxTree| tree.nodes.iter().map(|n| (n.start, n.count)).collect::<Vec<_>>();
-        assert_eq!((told(&alone), &alone.items), (told(&tree), &tree.items));
     }
 
     #[test]

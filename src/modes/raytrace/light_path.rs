@@ -24,8 +24,6 @@ pub struct LightPath<'t, 'a, R: Real> {
     pub work: Work,
     /// Whether an object with a tree was traced.
     pub was_traced: bool,
-    /// Of the ray that is followed.
-    bundle: Bundle,
 }
 
 /// How near to each other the rays of neighbouring pixels run.
@@ -63,7 +61,6 @@ impl<'t, 'a, R: Real> LightPath<'t, 'a, R> {
             cache,
             work: Work::default(),
             was_traced: false,
-            bundle: Bundle::FromEye,
         }
     }
 
@@ -84,8 +81,7 @@ impl<'t, 'a, R: Real> LightPath<'t, 'a, R> {
         bundle: Bundle,
     ) -> Vec3<R> {
         self.work.rays += 1;
-        self.bundle = bundle;
-        let Some((object, sight)) = self.nearest(ray, left) else { return self.sky.seen(ray) };
+        let Some((object, sight)) = self.nearest(ray, left, bundle) else { return self.sky.seen(ray) };
         let seer = &self.seers[object];
         let material = seer.material();
         let mut light = self.shade(object, ray, &sight);
@@ -126,9 +122,9 @@ impl<'t, 'a, R: Real> LightPath<'t, 'a, R> {
     }
 
     /// The nearest object along a ray.
-    fn nearest(&mut self, ray: &Ray<R>, left: Option<usize>) -> Option<(usize, Sight<R>)> {
+    fn nearest(&mut self, ray: &Ray<R>, left: Option<usize>, bundle: Bundle) -> Option<(usize, Sight<R>)> {
         let mut best: Option<(usize, Sight<R>)> = None;
-        let in_view = (self.bundle == Bundle::FromEye).then(|| self.eye.towards(ray.dir));
+        let in_view = (bundle == Bundle::FromEye).then(|| self.eye.towards(ray.dir));
         if in_view.is_some_and(<[u16]>::is_empty) {
             return None;
         }
@@ -139,7 +135,7 @@ impl<'t, 'a, R: Real> LightPath<'t, 'a, R> {
                 continue;
             }
             let to = best.as_ref().map_or(R::of(f64::INFINITY), |(_, sight)| sight.t);
-            if let Some(sight) = self.sight(index, ray, &slabs, to) {
+            if let Some(sight) = self.sight(index, ray, &slabs, to, bundle) {
                 best = Some((index, sight));
             }
         }
@@ -147,7 +143,14 @@ impl<'t, 'a, R: Real> LightPath<'t, 'a, R> {
     }
 
     /// One object along a ray, not beyond `to`.
-    fn sight(&mut self, index: usize, ray: &Ray<R>, slabs: &Slabs<R>, to: R) -> Option<Sight<R>> {
+    fn sight(
+        &mut self,
+        index: usize,
+        ray: &Ray<R>,
+        slabs: &Slabs<R>,
+        to: R,
+        bundle: Bundle,
+    ) -> Option<Sight<R>> {
         let seer = &self.seers[index];
         let (near, far) = slabs.stretch(&seer.bounds)?;
         if near > to || far.get() <= 0.0 {
@@ -155,7 +158,7 @@ impl<'t, 'a, R: Real> LightPath<'t, 'a, R> {
         }
         if seer.has_tree() {
             // The tree knows the first hit of the whole line: it serves where that lies ahead.
-            if self.bundle != Bundle::Scattered && near.get() > 0.0 {
+            if bundle != Bundle::Scattered && near.get() > 0.0 {
                 self.work.queries += 1;
                 if let Ok(answer) = self.askers[index].ask(ray, self.cache) {
                     self.work.interpolated += 1;

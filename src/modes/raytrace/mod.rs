@@ -9,9 +9,9 @@
 //! Trees are asked for what is smooth, by rays from the camera, or from its images in flat mirrors: the first hit of a line with
 //! its normal, and the ray that leaves a mirror or a glass body. What lights see of an object with a tree is interpolated, too. All
 //! of it is kept from view to view. Where trees do not answer, where a ray starts within an object's box, for objects without a
-//! tree and after a turn at what is curved, rays are traced. Both ways look for objects in a ray's direction only, and at a sky
-//! whose noise is made once. Colours are floats to the end; a pixel depends on its rays alone, so pictures are the same bits for
-//! any number of threads.
+//! tree and after a turn at what is curved, rays are traced. Both ways look for what the camera or a light sees in its direction
+//! only, and at a sky whose noise is made once. Colours are floats to the end; a pixel depends on its rays alone, so pictures are
+//! the same bits for any number of threads.
 
 mod around;
 mod cube;
