@@ -4,7 +4,7 @@ use std::marker::PhantomData;
 
 use super::lines::SurfaceLines;
 use super::memo::Memo;
-use super::surface::{Seen, blend, distance, f32s, vector};
+use super::surface::{Seen, blend, blended, distance, f32s, vector};
 use crate::geometry::{Ray, Real, Vec3};
 use crate::linespace::{Cell, LinePoint, PlanePair};
 use crate::ritree::{Attribute, Sampling};
@@ -190,10 +190,7 @@ impl<R: Real> Attribute for ExitRay<'_, R> {
     /// other exit rays are interpolated. That is left to [`exit_of`](Self::exit_of), which knows the ray.
     fn interpolate(&self, parts: &[(R, &Through)]) -> Through {
         let Some((_, first)) = parts.first() else { return Through::MISS };
-        let depth =
-            parts.iter().fold(R::of(0.0), |sum, (weight, p)| sum + *weight * R::of(p.seen.depth.into()));
-        let normal = blend(parts.iter().map(|(weight, p)| (*weight, &p.seen.normal)));
-        let seen = Seen { class: first.seen.class, depth: depth.get() as f32, normal: f32s(normal) };
+        let seen = blended(parts.iter().map(|(weight, p)| (*weight, &p.seen)));
         if first.exit_dir == [0.0; 3] || self.is_plain_mirror(first) {
             return Through { seen, ..**first };
         }

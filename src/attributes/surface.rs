@@ -34,7 +34,7 @@ impl Seen {
     /// The first hit of a line, and as it was found.
     pub(super) fn along<R: Real>(lines: &SurfaceLines, line: LinePoint) -> (Self, Option<Hit<R>>) {
         let ray = lines.ray::<R>(line);
-        let hit = lines.surface().hit(&ray, Reach::whole());
+        let hit = lines.surface().hit(&ray, Reach::whole().in_f32());
         let seen = |hit: Hit<R>| Self::of(&hit, lines.depth(hit.place(&ray), line.pair));
         (hit.map_or(Self::MISS, seen), hit)
     }
@@ -57,7 +57,17 @@ pub(crate) fn vector<R: Real>(v: [f32; 3]) -> Vec3<R> {
 
 /// A weighted sum of vectors.
 pub(super) fn blend<'a, R: Real>(parts: impl Iterator<Item = (R, &'a [f32; 3])>) -> Vec3<R> {
-    parts.fold(Vec3::default(), |sum, (weight, v)| sum + vector(*v) * weight)
+    let weighted = parts.map(|(weight, v)| vector(*v) * weight);
+    weighted.reduce(|sum, v| sum + v).unwrap_or_default()
+}
+
+/// The weighted sum of depths and normals.
+pub(super) fn blended<'a, R: Real>(parts: impl Iterator<Item = (R, &'a Seen)> + Clone) -> Seen {
+    let depth = parts.clone().map(|(weight, seen)| weight * R::of(seen.depth.into()));
+    let depth = depth.reduce(|sum, depth| sum + depth).unwrap_or_default();
+    let normal = blend(parts.clone().map(|(weight, seen)| (weight, &seen.normal)));
+    let class = parts.into_iter().next().map_or(0, |(_, seen)| seen.class);
+    Seen { class, depth: depth.get() as f32, normal: f32s(normal) }
 }
 
 /// How far two hits of one line are apart, box units, where a turn of the normal counts `leverage` times.
@@ -121,10 +131,7 @@ impl<R: Real> Attribute for FirstHit<'_, R> {
     }
 
     fn interpolate(&self, parts: &[(R, &Seen)]) -> Seen {
-        let depth = parts.iter().fold(R::of(0.0), |sum, (weight, s)| sum + *weight * R::of(s.depth.into()));
-        let normal = blend(parts.iter().map(|(weight, s)| (*weight, &s.normal)));
-        let class = parts.first().map_or(0, |(_, s)| s.class);
-        Seen { class, depth: depth.get() as f32, normal: f32s(normal) }
+        blended(parts.iter().map(|(weight, seen)| (*weight, *seen)))
     }
 
     fn direction(&self, output: &Seen) -> Option<Vec3<R>> {

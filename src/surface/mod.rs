@@ -82,12 +82,29 @@ pub struct Reach<R> {
     pub crossing: Crossing,
     /// The [part](Hit::part) that the ray starts on. Where no line of its slope meets a part twice, it is not searched again.
     pub left: Option<u32>,
+    /// How near to a hit its place is to be, as a share of the part that is hit, where it is sought by iteration.
+    pub accuracy: f64,
 }
+
+/// The [accuracy](Reach::accuracy) of hits in f64, and of those that are told in f32.
+const FULL: f64 = 1e-12;
+const IN_F32: f64 = 1e-7;
 
 impl<R: Real> Reach<R> {
     /// The whole ray, every crossing.
     pub fn whole() -> Self {
-        Self { from: R::of(0.0), to: R::of(f64::INFINITY), crossing: Crossing::Any, left: None }
+        Self {
+            from: R::of(0.0),
+            to: R::of(f64::INFINITY),
+            crossing: Crossing::Any,
+            left: None,
+            accuracy: FULL,
+        }
+    }
+
+    /// As this, for hits that are told in f32: a part is a small share of its surface, and a place on it nearer than that.
+    pub fn in_f32(self) -> Self {
+        Self { accuracy: IN_F32, ..self }
     }
 
     /// As this, for one kind of crossing.
@@ -145,6 +162,11 @@ impl Surface {
             Self::Mesh(s) => s.is_met(ray, reach),
             simple => simple.hit(ray, reach).is_some(),
         }
+    }
+
+    /// Whether hits are told by a formula.
+    pub fn has_closed_form(&self) -> bool {
+        matches!(self, Self::Sphere(_) | Self::Disc(_) | Self::Block(_))
     }
 
     /// Boxes that hold all of the surface, each a part of it.

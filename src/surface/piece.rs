@@ -28,14 +28,11 @@ const READY_COSINE: f64 = 0.2;
 /// Cuts on the way to a piece that is made ready. Near the pole of a patch that shrinks to a point no number is enough.
 const MOST_CUTS: u32 = 12;
 
-/// Newton's method stops when its error is surely below this share of a piece.
-const PARAMETER_ACCURACY: f64 = 1e-12;
-
 /// Parameters that rounding moves by more than this share of a piece are not sought: the ray sees the piece edge-on. On
 /// a fold, roots are so found if the ray is nearer to the surface's inside by some 50 times its rounding.
 const LARGEST_TOLERANCE: f64 = 0.1;
 
-/// Halvings from 1 to below [`PARAMETER_ACCURACY`]: with a contraction of ½ no iteration goes on longer.
+/// Halvings from 1 to below the best [accuracy](super::Reach::accuracy): with a contraction of ½ no iteration goes on longer.
 const MOST_STEPS: u32 = 41;
 
 /// Bounds of rounding take so many operations in a row: the evaluation of a point (22) and the three products after it.
@@ -125,7 +122,7 @@ impl Piece {
         [Self::new(patch, self.patch, self.low, size), Self::new(patch, self.patch, upper, size)]
     }
 
-    /// Calls `found` for each root of the ray on the piece, its edges included. A ray that `is_leaving` starts on the piece; that
+    /// Calls `found` for each root of the ray on the piece, its edges included, to an `accuracy` as a share of it. A ray that `is_leaving` starts on the piece; that
     /// root is left out where it is certain to be the only one. A ray that only touches the piece, nearer
     /// to it than rounding can tell, does not cross it.
     pub fn roots<R: Real>(
@@ -134,6 +131,7 @@ impl Piece {
         ray: &Ray<R>,
         reach: f64,
         is_leaving: bool,
+        accuracy: f64,
         found: &mut impl FnMut(Root<R>),
     ) {
         // c = d × (o − centre): the ray's moment about the middle.
@@ -142,8 +140,8 @@ impl Piece {
         let steepness = det.abs();
         let kappa = R::of(self.slack) / steepness;
         // What rounding moves a parameter by: intercepts err by γ of the distances they are made of.
-        let tolerance = 2.0 * self.longest * gamma(OPERATIONS) * (reach + self.magnitude) / steepness.get()
-            + PARAMETER_ACCURACY;
+        let tolerance =
+            2.0 * self.longest * gamma(OPERATIONS) * (reach + self.magnitude) / steepness.get() + accuracy;
         if kappa.get() <= LARGEST_KAPPA && tolerance <= LARGEST_TOLERANCE {
             if is_leaving {
                 return;
@@ -155,12 +153,12 @@ impl Piece {
             if start[0].abs() > half || start[1].abs() > half {
                 return;
             }
-            if let Some(root) = self.newton(patch, ray, start, kappa, steepness, tolerance) {
+            if let Some(root) = self.newton(patch, ray, start, kappa, steepness, [tolerance, accuracy]) {
                 found(root);
             }
             return;
         }
-        self.cut(patch, ray, reach, found);
+        self.cut(patch, ray, reach, accuracy, found);
     }
 
     /// The root, by Newton's method on the piece, clamped to it; clamping to a convex set that holds the root moves no
@@ -172,7 +170,7 @@ impl Piece {
         start: [R; 2],
         kappa: R,
         steepness: R,
-        tolerance: f64,
+        [tolerance, accuracy]: [f64; 2],
     ) -> Option<Root<R>> {
         let limit = 0.5 + tolerance;
         let clamp = |x: R| x.max(R::of(-limit)).min(R::of(limit));
@@ -180,7 +178,7 @@ impl Piece {
         let kept = R::of(1.0) - kappa;
         let quadratic = R::of(self.bend) / (steepness * kept);
         // The error before a step is at most the step over 1 − q, q ≤ ½.
-        let enough = |step: R| (quadratic * (R::of(4.0) * step * step)).get() <= PARAMETER_ACCURACY;
+        let enough = |step: R| (quadratic * (R::of(4.0) * step * step)).get() <= accuracy;
         let mut x = start.map(clamp);
         for _ in 0..MOST_STEPS {
             let u = R::of(self.low[0]) + R::of(self.size[0]) * (x[0] + R::of(0.5));
@@ -213,7 +211,14 @@ impl Piece {
     }
 
     /// The roots on the two halves, if the ray's line comes near.
-    fn cut<R: Real>(&self, patch: &BezierPatch, ray: &Ray<R>, reach: f64, found: &mut impl FnMut(Root<R>)) {
+    fn cut<R: Real>(
+        &self,
+        patch: &BezierPatch,
+        ray: &Ray<R>,
+        reach: f64,
+        accuracy: f64,
+        found: &mut impl FnMut(Root<R>),
+    ) {
         let rounding = gamma(OPERATIONS) * (reach + self.magnitude);
         // The ray misses the ball around the piece.
         let radius = 0.5 * self.bounds.diagonal() + rounding;
@@ -238,7 +243,9 @@ impl Piece {
                 return;
             }
         }
-        self.halves(patch, self.longer()).iter().for_each(|half| half.roots(patch, ray, reach, false, found));
+        self.halves(patch, self.longer())
+            .iter()
+            .for_each(|half| half.roots(patch, ray, reach, false, accuracy, found));
     }
 
     /// Whether a plane along the ray parts its line from the piece: across d and a, or d and b. On the piece S is no farther

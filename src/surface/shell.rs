@@ -97,12 +97,12 @@ impl<'a, R: Real> Aim<'a, R> {
         Self { shell, ray, slabs: Slabs::new(ray), magnitude }
     }
 
-    fn roots(&self, item: u32, left: Option<u32>, mut found: impl FnMut(Hit<R>)) {
+    fn roots(&self, item: u32, reach: &Reach<R>, mut found: impl FnMut(Hit<R>)) {
         let piece = &self.shell.pieces[item as usize];
         let patch = &self.shell.patches[piece.patch as usize];
         let class = self.shell.classes[piece.patch as usize];
-        let is_leaving = left == Some(item);
-        piece.roots(patch, self.ray, self.magnitude, is_leaving, &mut |root: Root<R>| {
+        let is_leaving = reach.left == Some(item);
+        piece.roots(patch, self.ray, self.magnitude, is_leaving, reach.accuracy, &mut |root: Root<R>| {
             let enters = self.ray.dir.dot(root.normal).get() < 0.0;
             found(Hit { t: root.t, normal: root.normal, enters, class, error: root.error, part: Some(item) });
         });
@@ -132,8 +132,9 @@ impl<R: Real> Search for Nearest<'_, R> {
         if self.entry(&self.aim.shell.pieces[item as usize].bounds).is_none() {
             return;
         }
+        let searched = self.reach;
         let (reach, best, any) = (&mut self.reach, &mut self.best, self.any);
-        self.aim.roots(item, reach.left, |hit| {
+        self.aim.roots(item, &searched, |hit| {
             if reach.admits(hit.t, hit.enters) {
                 reach.to = if any { R::of(f64::NEG_INFINITY) } else { hit.t };
                 *best = Some(Hit { normal: hit.normal.normalized(), ..hit });
@@ -160,7 +161,7 @@ impl<R: Real> Search for All<'_, R> {
 
     fn item(&mut self, item: u32) {
         let hits = &mut self.hits;
-        self.aim.roots(item, None, |hit| {
+        self.aim.roots(item, &Reach::whole(), |hit| {
             if hit.t.get() > 0.0 {
                 hits.push(Hit { normal: hit.normal.normalized(), ..hit });
             }
