@@ -72,11 +72,11 @@ impl<'a> SurfaceLines<'a> {
         self.surface
     }
 
-    /// How cells of its lines are sampled. Along outlines they are a half larger than elsewhere, in the paper's pictures.
+    /// How cells of its lines are sampled.
     pub(super) fn sampling(&self) -> Sampling {
         Sampling {
             levels_per_look: 4,
-            levels_spared: 2,
+            levels_spared: 0,
             remembers: true,
             scheme: Scheme::Simplicial,
             // Beside a fold, lines between five that hit may pass the surface by.

@@ -26,7 +26,7 @@ pub struct Sampling {
     pub remembers: bool,
     /// How lines are interpolated.
     pub scheme: Scheme,
-    /// Whether lines are interpolated in a cell whose corners do not fit together, if they lie in a simplex whose corners do.
+    /// Whether lines are interpolated in a cell that holds a discontinuity, if they lie in a simplex whose corners fit together.
     /// Not for surfaces that may hide parts of their own.
     pub parts: bool,
 }

@@ -1,9 +1,9 @@
 //! One line after another down a tree.
 //!
-//! Lines asked one after another mostly lie in one cell, or in cells near each other. So whoever asks remembers where the last
-//! one ended: the final cell, which often answers the next line as well; and, where the cache had no room, the way down to it,
-//! a few kilobytes, so that what the cells of neighbouring lines have in common is not computed for each. Answers are those
-//! of the cells, whatever is remembered.
+//! Lines asked one after another mostly lie in one cell, or in cells near each other. So whoever asks remembers the last one's way
+//! down: its final cell often answers the next line as well, and if not, a cell little higher leads to the one that does. Where
+//! the cache had no room, the cells below are remembered whole, a few kilobytes, so that what those of neighbouring lines have
+//! in common is not computed for each. Answers are those of the cells, whatever is remembered.
 
 use std::sync::atomic::Ordering;
 
@@ -11,15 +11,15 @@ use super::attribute::Attribute;
 use super::cell::Place;
 use super::interpolant::Corners;
 use super::look::Look;
-use super::node::Leaf;
+use super::node::{Leaf, Node};
 use super::{Answer, Cache, Reason, RiTree};
 use crate::linespace::{LinePoint, is_in_range};
 
 /// Asks a tree for one line after another, by one thread.
 pub struct Descent<'t, A: Attribute> {
     tree: &'t RiTree<A>,
-    /// The last cell of the tree that answered.
-    last: Option<(Place, &'t Leaf<A::Output>)>,
+    /// The last way down the tree, from a root.
+    path: Vec<(Place, &'t Node<A::Output>)>,
     /// Cells of the last way down that the cache had no room for, from the highest to a final one.
     trail: Vec<Step<A::Output>>,
 }
@@ -36,7 +36,7 @@ struct Step<T> {
 
 impl<'t, A: Attribute> Descent<'t, A> {
     pub(super) fn new(tree: &'t RiTree<A>) -> Self {
-        Self { tree, last: None, trail: Vec::new() }
+        Self { tree, path: Vec::new(), trail: Vec::new() }
     }
 
     /// The tree.
@@ -62,21 +62,25 @@ impl<'t, A: Attribute> Descent<'t, A> {
         if !is_in_range(&line.stuv) {
             return None;
         }
-        if let Some((place, leaf)) = self.last
-            && place.holds(&line)
+        while self.path.pop_if(|(place, _)| !place.holds(&line)).is_some() {}
+        if self.path.last().is_none_or(|(_, node)| node.leaf().is_none())
+            && self.trail.first().is_some_and(|step| step.place.holds(&line))
         {
-            return Some(self.answer_by(place, leaf, &line));
-        }
-        if self.trail.first().is_some_and(|step| step.place.holds(&line)) {
             return Some(self.answer_along_trail(&line));
         }
-        let mut place = Place::root(line.pair);
-        let Some(mut node) = tree.root(line.pair, cache) else {
-            return Some(self.answer_without_keeping(place, None, &line));
+        let (mut place, mut node) = match self.path.last() {
+            Some(&lowest) => lowest,
+            None => {
+                let place = Place::root(line.pair);
+                let Some(root) = tree.root(line.pair, cache) else {
+                    return Some(self.answer_without_keeping(place, None, &line));
+                };
+                self.path.push((place, root));
+                (place, root)
+            }
         };
         loop {
             if let Some(leaf) = node.leaf() {
-                self.last = Some((place, leaf));
                 return Some(self.answer_by(place, leaf, &line));
             }
             let side = place.side_of::<A::Real>(&line.stuv);
@@ -86,7 +90,8 @@ impl<'t, A: Attribute> Descent<'t, A> {
                     Err(corners) => return Some(self.answer_without_keeping(place, corners, &line)),
                 }
             };
-            (node, place) = (&halves[side], place.half(side));
+            (place, node) = (place.half(side), &halves[side]);
+            self.path.push((place, node));
         }
     }
 

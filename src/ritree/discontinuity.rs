@@ -2,7 +2,7 @@
 //! (§2.5).
 
 use super::Parameters;
-use super::attribute::Attribute;
+use super::attribute::{Attribute, Sampling, Scheme};
 use super::cell::{Kind, Place, Reason};
 use super::interpolant::{Corners, Simplex, has_simplex, linear_weights};
 use crate::geometry::Real;
@@ -19,16 +19,28 @@ impl Place {
         let sides = sides(attribute, corners);
         let is_defined = |side: &[usize]| linear_weights(side, [A::Real::of(0.5); 4]).is_some();
         let may_be_located = sides.iter().any(|&class| is_defined(&side(attribute, corners, class)));
-        if !may_be_located && !may_hold_simplex(attribute, corners, |c| attribute.outline_class(c)) {
+        let Sampling { scheme, parts, .. } = attribute.sampling();
+        // Where no discontinuity is, simplices differ only in how far directions are apart.
+        let is_one_part = why == Reason::Angle
+            && scheme == Scheme::Simplicial
+            && self.are_joined(attribute, corners, 0..16);
+        let by_simplices = parts || is_one_part;
+        let may_hold_simplex =
+            by_simplices && holds_simplex(attribute, corners, |c| attribute.outline_class(c));
+        if !may_be_located && !may_hold_simplex {
             return Kind::Traced(why);
         }
         self.finish(attribute, corners);
+        if is_one_part && !parts {
+            let is_one_class = Classes::of(corners, |c| attribute.class(c)).reason().is_none();
+            return if is_one_class { Kind::Parted((), why) } else { Kind::Traced(why) };
+        }
         let usable = |&class: &u32| usable(attribute, corners, class, parameters).ok();
         let located: Vec<_> = sides.iter().filter_map(usable).filter(|side| is_defined(side)).collect();
         let are_joined = |side: &Vec<usize>| self.are_joined(attribute, corners, side.iter().copied());
         if !located.is_empty() && located.iter().all(are_joined) {
             Kind::TwoClasses(())
-        } else if may_hold_simplex(attribute, corners, |c| attribute.class(c)) {
+        } else if by_simplices && holds_simplex(attribute, corners, |c| attribute.class(c)) {
             Kind::Parted((), why)
         } else {
             Kind::Traced(why)
@@ -44,9 +56,6 @@ impl Place {
         stuv: [f64; 4],
         parameters: &Parameters,
     ) -> Option<A::Output> {
-        if !attribute.sampling().parts {
-            return None;
-        }
         let fits = |simplex: &Simplex<A::Real>| {
             let [first, rest @ ..] = simplex.corners().map(|bits| &corners[bits]);
             is_hit(attribute, first)
@@ -162,14 +171,13 @@ fn is_hit<A: Attribute>(attribute: &A, output: &A::Output) -> bool {
     !attribute.is_miss(attribute.outline_class(output))
 }
 
-/// Whether lines may be interpolated in a simplex whose corners all hit and are of one class.
-fn may_hold_simplex<A: Attribute>(
+/// Whether there is a simplex whose corners all hit and are of one class.
+fn holds_simplex<A: Attribute>(
     attribute: &A,
     corners: &Corners<A::Output>,
     class_of: impl Fn(&A::Output) -> u32,
 ) -> bool {
-    attribute.sampling().parts
-        && has_simplex(|bits| is_hit(attribute, &corners[bits]).then(|| class_of(&corners[bits])))
+    has_simplex(|bits| is_hit(attribute, &corners[bits]).then(|| class_of(&corners[bits])))
 }
 
 /// Whether two of the outputs' directions differ by more than the threshold.

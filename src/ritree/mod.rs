@@ -152,7 +152,8 @@ impl<A: Attribute> RiTree<A> {
             Kind::TwoClasses(samples) => {
                 let by_class =
                     || place.of_own_class(&self.attribute, &samples.corners, stuv, &self.parameters);
-                by_simplex(samples).map_or_else(by_class, Ok).map_or_else(Answer::Trace, Answer::Interpolated)
+                let told = if self.attribute.sampling().parts { by_simplex(samples) } else { None };
+                told.map_or_else(by_class, Ok).map_or_else(Answer::Trace, Answer::Interpolated)
             }
             Kind::Traced(reason) => Answer::Trace(reason),
             Kind::Parted(samples, reason) => {
