@@ -189,10 +189,10 @@ fn traced(criterion: &mut Criterion) {
 /// Others are told by the box alone.
 fn rays_to(surface: &Surface, camera: &Camera) -> [Vec<Ray<f64>>; 2] {
     let (columns, rows) = PICTURE;
-    let bounds = surface.bounds();
+    let (bounds, mut rays) = (surface.bounds(), camera.rays(PICTURE));
     let (hits, misses) = (0..rows)
         .flat_map(|row| (0..columns).map(move |column| [column, row].map(|pixel| f64::from(pixel) + 0.5)))
-        .map(|[x, y]| camera.ray(PICTURE, x, y))
+        .map(move |place| rays.through(place))
         .filter(|ray| Slabs::new(ray).stretch(&bounds).is_some())
         .partition(|ray| surface.hit(ray, Reach::whole()).is_some());
     [hits, misses]

@@ -125,8 +125,9 @@ impl<'a, R: Real> Bodies<'a, R> {
         let mut tile = Lengths::default();
         let mut descents: Vec<_> =
             self.bodies.iter().map(|body| body.tree.as_ref().map(RiTree::descent)).collect();
+        let mut rays = camera.rays::<R>(size);
         for (column, row) in region.places() {
-            let ray = camera.ray::<R>(size, f64::from(column) + 0.5, f64::from(row) + 0.5);
+            let ray = rays.through([f64::from(column) + 0.5, f64::from(row) + 0.5]);
             let mut light = R::of(1.0);
             let traced_before = tile.work.traced;
             tile.work.rays += 1;

@@ -67,6 +67,16 @@ impl Disc {
         Bounds { min: self.centre - reach, max: self.centre + reach }
     }
 
+    /// A place mirrored at its plane.
+    pub fn mirrored(&self, place: DVec3) -> DVec3 {
+        place - 2.0 * (place - self.centre).dot(self.normal) * self.normal
+    }
+
+    /// A way mirrored at its plane.
+    pub fn mirrored_way(&self, way: DVec3) -> DVec3 {
+        way - 2.0 * way.dot(self.normal) * self.normal
+    }
+
     /// The hit, if it is within reach. A ray in the disc's plane does not cross it.
     pub fn hit<R: Real>(&self, ray: &Ray<R>, reach: Reach<R>) -> Option<Hit<R>> {
         let normal = Vec3::of(self.normal);

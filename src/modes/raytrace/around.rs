@@ -1,8 +1,7 @@
-//! Which objects lie in which direction from a point that many rays come from: the camera, a light.
+//! Which objects lie in which direction from a light.
 //!
 //! A cube around the point has on each cell of its sides the objects whose boxes are seen there, so that a ray is held against
-//! these alone (item buffers, Weghorst, Hooper & Greenberg 1984, doi:10.1145/357332.357335; light buffers, Haines & Greenberg
-//! 1986, doi:10.1109/MCG.1986.276832). Exact tracing and trees both ask it.
+//! these alone (light buffers, Haines & Greenberg 1986, doi:10.1109/MCG.1986.276832). Exact tracing and trees both ask it.
 
 use glam::DVec3;
 
@@ -19,19 +18,19 @@ const FEW: usize = 2;
 pub struct Around {
     /// For each cell where its objects begin, one more at the end; empty if all are everywhere.
     starts: Vec<u32>,
-    /// Indices of objects, ascending in each cell.
-    objects: Vec<u16>,
+    /// Indices of objects, in each cell in the order in which rays are held against them.
+    objects: Vec<u32>,
 }
 
 impl Around {
-    /// Boxes around a point; fewer than 65 536.
-    pub fn new(point: DVec3, boxes: &[Bounds]) -> Self {
-        let all = 0..boxes.len().min(u16::MAX.into()) as u16;
-        if boxes.len() <= FEW {
-            return Self { starts: Vec::new(), objects: all.collect() };
+    /// Boxes around a point, in an order.
+    pub fn new(point: DVec3, boxes: &[Bounds], order: &[u32]) -> Self {
+        if order.len() <= FEW {
+            return Self { starts: Vec::new(), objects: order.to_vec() };
         }
         let mut cells = vec![Vec::new(); 6 * CELLS * CELLS];
-        for (object, bounds) in all.zip(boxes) {
+        for &object in order {
+            let bounds = &boxes[object as usize];
             for side in 0..6 {
                 let Some([columns, rows]) = shadow(point, bounds, side) else { continue };
                 for row in rows[0]..=rows[1] {
@@ -49,9 +48,9 @@ impl Around {
         Self { starts, objects }
     }
 
-    /// The objects that rays in this direction from the point may meet, ascending.
+    /// The objects that rays in this direction from the point may meet.
     #[inline]
-    pub fn towards<R: Real>(&self, way: Vec3<R>) -> &[u16] {
+    pub fn towards<R: Real>(&self, way: Vec3<R>) -> &[u32] {
         if self.starts.is_empty() {
             return &self.objects;
         }
@@ -104,22 +103,23 @@ mod tests {
             .map(|i| Surface::Sphere(Sphere::new(vector(100.0), 1.0 + f64::from(i)).expect("a sphere")))
             .collect();
         let boxes: Vec<Bounds> = balls.iter().map(Surface::bounds).collect();
+        let order: Vec<u32> = (0..30).rev().collect();
         let (mut met, mut held) = (0, 0);
         // From outside, from among them, and from within one.
         for point in [DVec3::new(300.0, -200.0, 90.0), DVec3::ZERO, boxes[29].centre()] {
-            let around = Around::new(point, &boxes);
+            let around = Around::new(point, &boxes, &order);
             for _ in 0..3_000 {
                 let dir = Vec3::<f64>::of(vector(1.0).normalize());
                 let ray = Ray { origin: Vec3::of(point), dir };
                 let objects = around.towards(dir);
                 held += objects.len();
-                for (index, ball) in (0_u16..).zip(&balls) {
+                for (index, ball) in (0_u32..).zip(&balls) {
                     let is_met = ball.hit(&ray, Reach::whole()).is_some();
                     met += usize::from(is_met);
                     assert!(!is_met || objects.contains(&index), "{index} from {point} along {dir:?}");
                 }
                 assert!(
-                    objects.is_sorted()
+                    objects.is_sorted_by(|a, b| a > b)
                         && Slabs::new(&ray)
                             .stretch(&boxes[0])
                             .is_none_or(|s| s.1 < 0.0 || objects.contains(&0))

@@ -101,18 +101,17 @@ impl<'a> LightMap<'a> {
         Self { surface, light, slack, own_slack, lattice: Lattice::new(&bounds, light) }
     }
 
-    /// Whether the surface hides the light from a place of another one.
-    pub fn hides<R: Real>(&self, place: Vec3<R>) -> bool {
-        self.hides_by(place, R::of(self.slack))
+    /// Whether the surface hides the light from a place of another one that lies `way` from it.
+    pub fn hides<R: Real>(&self, way: Vec3<R>) -> bool {
+        self.hides_by(way, R::of(self.slack))
     }
 
     /// Whether it hides the light from a place of its own, which faces the light at this cosine.
-    pub fn hides_itself<R: Real>(&self, place: Vec3<R>, cosine: R) -> bool {
-        self.hides_by(place, R::of(self.own_slack) / cosine.max(R::of(LEAST_COSINE)))
+    pub fn hides_itself<R: Real>(&self, way: Vec3<R>, cosine: R) -> bool {
+        self.hides_by(way, R::of(self.own_slack) / cosine.max(R::of(LEAST_COSINE)))
     }
 
-    fn hides_by<R: Real>(&self, place: Vec3<R>, slack: R) -> bool {
-        let way = place - Vec3::of(self.light);
+    fn hides_by<R: Real>(&self, way: Vec3<R>, slack: R) -> bool {
         let known = self.lattice.as_ref().and_then(|lattice| lattice.hides(way, slack, self));
         known.unwrap_or_else(|| self.is_met_before(way, slack))
     }
@@ -181,7 +180,7 @@ impl Lattice {
         let way = Vec3::<R>::of(way);
         let over = R::of(1.0) / way.length();
         let ray = Ray { origin: Vec3::of(map.light), dir: way * over };
-        map.surface.hit(&ray, Reach::whole()).map_or(f64::INFINITY, |hit| (hit.t * over).get())
+        map.surface.hit(&ray, Reach::whole().in_f32()).map_or(f64::INFINITY, |hit| (hit.t * over).get())
     }
 
     /// Nothing is known, but for the cells that no box around a part of the surface covers.
@@ -339,12 +338,12 @@ mod tests {
         let surface = &world.objects[0].surface;
         let light = surface.bounds().centre() + DVec3::new(0.0, 0.0, 900.0);
         let map = LightMap::new(surface, light, 0.05);
-        let hides = |off: DVec3| map.hides(Vec3::<f64>::of(surface.bounds().centre() + off));
+        let hides = |off: DVec3| map.hides(Vec3::<f64>::of(surface.bounds().centre() + off - light));
         assert!(hides(DVec3::new(0.0, 0.0, -300.0)));
         assert!(!hides(DVec3::new(0.0, 0.0, 300.0)) && !hides(DVec3::new(0.0, 0.0, 1200.0)));
         assert!(!hides(DVec3::new(400.0, 0.0, -300.0)));
         // So near that no plane shows all of the object, every ray is traced.
         let near = LightMap::new(surface, surface.bounds().centre(), 0.05);
-        assert!(near.lattice.is_none() && near.hides(Vec3::<f64>::of(light)));
+        assert!(near.lattice.is_none() && near.hides(Vec3::<f64>::of(light - surface.bounds().centre())));
     }
 }

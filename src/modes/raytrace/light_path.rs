@@ -1,25 +1,25 @@
 //! Light on its way back to the camera: what a ray meets, how that is lit, and which rays go on from there.
 
-use super::Work;
-use super::around::Around;
+use std::cell::LazyCell;
+
+use super::in_view::InView;
 use super::seer::{Asker, Seer, Sight};
-use super::sky_map::SkyMap;
+use super::{Renderer, Work};
 use crate::geometry::{Ray, Real, Vec3};
-use crate::ritree::Cache;
-use crate::scene::trace::World;
+use crate::scene::trace::{Camera, SkyFrom};
 use crate::surface::optics::{reflectance, reflected};
 use crate::surface::{Reach, Slabs};
 
 /// Follows the rays of one tile.
 pub struct LightPath<'t, 'a, R: Real> {
-    world: &'t World,
-    sky: &'t SkyMap<'a>,
-    /// Which objects lie where around the camera, and around each light.
-    eye: &'t Around,
-    lights: &'t [Around],
+    renderer: &'t Renderer<'a, R>,
     seers: &'t [Seer<'a, R>],
     askers: Vec<Asker<'t, 'a, R>>,
-    cache: &'t Cache,
+    /// What the tile may show, and the place of the picture that light now comes to, pixels.
+    in_view: &'t InView,
+    place: [f64; 2],
+    /// The sky as the camera sees it.
+    sky_from_eye: SkyFrom<R>,
     /// What the rays have taken so far.
     pub work: Work,
     /// Whether an object with a tree was traced.
@@ -31,8 +31,8 @@ pub struct LightPath<'t, 'a, R: Real> {
 enum Bundle {
     /// As they left the camera: neighbours ask the same cells.
     FromEye,
-    /// Mirrored, but at planes only, as if they came from the camera's images.
-    FromImages,
+    /// Mirrored, but at planes only, as if they came from one of the camera's images: by this flat mirror, or by more than one.
+    FromImage(Option<usize>),
     /// Turned by what is curved. They scatter over line space, and the cells that a few of them would share cost more than tracing
     /// them.
     Scattered,
@@ -42,30 +42,28 @@ enum Bundle {
 const LEAST_SHARE: f64 = 1e-3;
 
 impl<'t, 'a, R: Real> LightPath<'t, 'a, R> {
-    /// For rays from the camera that `eye` lies around.
+    /// For rays of a camera through the pixels of a tile.
     pub fn new(
-        world: &'t World,
-        sky: &'t SkyMap<'a>,
-        eye: &'t Around,
-        lights: &'t [Around],
+        renderer: &'t Renderer<'a, R>,
         seers: &'t [Seer<'a, R>],
-        cache: &'t Cache,
+        camera: &Camera,
+        in_view: &'t InView,
     ) -> Self {
         Self {
-            world,
-            sky,
-            eye,
-            lights,
+            renderer,
             seers,
             askers: seers.iter().map(Seer::asker).collect(),
-            cache,
+            in_view,
+            place: [0.0; 2],
+            sky_from_eye: renderer.world.sky.from(Vec3::of(camera.eye())),
             work: Work::default(),
             was_traced: false,
         }
     }
 
-    /// The light that comes to the camera along a ray.
-    pub fn seen(&mut self, ray: &Ray<R>) -> Vec3<R> {
+    /// The light that comes to the camera along the ray through a place of the picture.
+    pub fn seen(&mut self, ray: &Ray<R>, place: [f64; 2]) -> Vec3<R> {
+        self.place = place;
         self.radiance(ray, R::of(1.0), None, 0, Bundle::FromEye)
     }
 
@@ -81,11 +79,19 @@ impl<'t, 'a, R: Real> LightPath<'t, 'a, R> {
         bundle: Bundle,
     ) -> Vec3<R> {
         self.work.rays += 1;
-        let Some((object, sight)) = self.nearest(ray, left, bundle) else { return self.sky.seen(ray) };
+        let Some((object, sight)) = self.nearest(ray, left, bundle) else {
+            let place = match bundle {
+                Bundle::FromEye => self.sky_from_eye.place(ray.dir),
+                Bundle::FromImage(_) | Bundle::Scattered => {
+                    self.renderer.world.sky.from(ray.origin).place(ray.dir)
+                }
+            };
+            return self.renderer.sky.colour_at(place);
+        };
         let seer = &self.seers[object];
         let material = seer.material();
         let mut light = self.shade(object, ray, &sight);
-        if turns >= self.world.most_turns {
+        if turns >= self.renderer.world.most_turns {
             return light;
         }
         let is_worth = |part: R| (share * part).get() > LEAST_SHARE;
@@ -112,7 +118,8 @@ impl<'t, 'a, R: Real> LightPath<'t, 'a, R> {
             let part = R::of(material.share(inner_turns));
             if is_worth(part) {
                 let bundle = match bundle {
-                    Bundle::FromEye | Bundle::FromImages if seer.is_flat() => Bundle::FromImages,
+                    Bundle::FromEye if seer.is_flat() => Bundle::FromImage(Some(object)),
+                    Bundle::FromImage(_) if seer.is_flat() => Bundle::FromImage(None),
                     _ => Bundle::Scattered,
                 };
                 light = light + self.radiance(&on, share * part, Some(object), turns + 1, bundle) * part;
@@ -123,19 +130,26 @@ impl<'t, 'a, R: Real> LightPath<'t, 'a, R> {
 
     /// The nearest object along a ray.
     fn nearest(&mut self, ray: &Ray<R>, left: Option<usize>, bundle: Bundle) -> Option<(usize, Sight<R>)> {
+        let in_view = self.in_view;
+        let objects = match bundle {
+            Bundle::FromEye => in_view.straight(),
+            Bundle::FromImage(Some(mirror)) => in_view.mirrored_by(mirror),
+            Bundle::FromImage(None) | Bundle::Scattered => in_view.anyhow(),
+        };
+        let place = self.place;
+        let objects = objects.iter().filter(|(_, footprint)| footprint.holds(place));
+        let slabs = LazyCell::new(|| Slabs::new(ray));
         let mut best: Option<(usize, Sight<R>)> = None;
-        let in_view = (bundle == Bundle::FromEye).then(|| self.eye.towards(ray.dir));
-        if in_view.is_some_and(<[u16]>::is_empty) {
-            return None;
-        }
-        let slabs = Slabs::new(ray);
-        for n in 0..in_view.map_or(self.seers.len(), <[u16]>::len) {
-            let index = in_view.map_or(n, |objects| objects[n].into());
-            if Some(index) == left {
-                continue;
-            }
+        for index in objects.map(|(index, _)| *index as usize).filter(|&index| Some(index) != left) {
             let to = best.as_ref().map_or(R::of(f64::INFINITY), |(_, sight)| sight.t);
-            if let Some(sight) = self.sight(index, ray, &slabs, to, bundle) {
+            let seer = &self.seers[index];
+            // What is in view is mostly met: where a hit takes little more than a look at the box, the box is left out.
+            let sight = if bundle != Bundle::Scattered && !seer.has_tree() && seer.has_closed_form() {
+                seer.trace(ray, Reach { to, ..Reach::whole() })
+            } else {
+                self.sight(index, ray, &slabs, to, bundle)
+            };
+            if let Some(sight) = sight {
                 best = Some((index, sight));
             }
         }
@@ -160,7 +174,7 @@ impl<'t, 'a, R: Real> LightPath<'t, 'a, R> {
             // The tree knows the first hit of the whole line: it serves where that lies ahead.
             if bundle != Bundle::Scattered && near.get() > 0.0 {
                 self.work.queries += 1;
-                if let Ok(answer) = self.askers[index].ask(ray, self.cache) {
+                if let Ok(answer) = self.askers[index].ask(ray, &self.renderer.cache) {
                     self.work.interpolated += 1;
                     return answer.filter(|sight| sight.t <= to);
                 }
@@ -173,52 +187,60 @@ impl<'t, 'a, R: Real> LightPath<'t, 'a, R> {
 
     /// What a place shows of the lights and of the sky's light.
     fn shade(&mut self, object: usize, ray: &Ray<R>, sight: &Sight<R>) -> Vec3<R> {
-        let world = self.world;
-        let material = self.seers[object].material();
-        let colour = Vec3::of(material.colour);
-        let mut light = colour.scaled(Vec3::of(world.ambient)) * R::of(material.ambient);
+        let (world, seers) = (self.renderer.world, self.seers);
+        let seer = &seers[object];
+        let mut light = Vec3::of(seer.ambient);
+        let material = seer.material();
         if material.is_dark() {
             return light;
         }
-        let mut mirrored = None;
-        for (light_index, lamp) in world.lights.iter().enumerate() {
+        let has_highlights = material.specular > 0.0;
+        // Twice the cosine at which the ray comes.
+        let comes = if has_highlights { R::of(2.0) * ray.dir.dot(sight.normal) } else { R::default() };
+        for (index, lamp) in world.lights.iter().enumerate() {
             let way = Vec3::of(lamp.position) - sight.place;
-            let far = way.length();
-            let dir = way * (R::of(1.0) / far);
-            let cosine = dir.dot(sight.normal);
-            if cosine.get() <= 0.0 || self.seers[object].hides_itself(light_index, ray, sight, cosine) {
+            let facing = way.dot(sight.normal);
+            if facing.get() <= 0.0 {
                 continue;
             }
-            let reaching = self.visibility(object, light_index, &Ray { origin: sight.place, dir }, far);
+            let far = way.length();
+            let over = R::of(1.0) / far;
+            let cosine = facing * over;
+            if seer.hides_itself(index, -way, ray, sight, cosine) {
+                continue;
+            }
+            let reaching = self.visibility(object, index, sight.place, way, far);
             if reaching.get() <= 0.0 {
                 continue;
             }
-            let lamp = Vec3::of(lamp.colour) * reaching;
-            light = light + colour.scaled(lamp) * (cosine * R::of(material.diffuse));
-            if material.specular > 0.0 {
-                let mirrored = mirrored.get_or_insert_with(|| reflected(ray.dir, sight.normal));
-                let towards = mirrored.dot(dir).max(R::of(0.0));
-                if towards.get() > self.seers[object].highlight_from {
-                    light = light + lamp * (towards.powf(material.shininess) * R::of(material.specular));
+            light = light + Vec3::of(seer.scattered[index]) * (cosine * reaching);
+            if has_highlights {
+                // Of the mirrored ray and the way to the light.
+                let towards = ray.dir.dot(way) * over - comes * cosine;
+                if towards.get() > seer.highlight_from {
+                    let strength = towards.powf(material.shininess) * R::of(material.specular) * reaching;
+                    light = light + Vec3::of(lamp.colour) * strength;
                 }
             }
         }
         light
     }
 
-    /// The share of a light that reaches a place of an object through all others.
-    fn visibility(&mut self, object: usize, light: usize, ray: &Ray<R>, far: R) -> R {
+    /// The share of a light that reaches a place of an object through all others. The `way` from there to the light is `far`.
+    fn visibility(&mut self, object: usize, light: usize, place: Vec3<R>, way: Vec3<R>, far: R) -> R {
         self.work.rays += 1;
         let mut share = R::of(1.0);
-        let on_the_way = self.lights[light].towards(-ray.dir);
-        if on_the_way.iter().all(|&index| usize::from(index) == object) {
+        let on_the_way = self.renderer.lights[light].towards(-way);
+        if on_the_way.iter().all(|&index| index as usize == object) {
             return share;
         }
-        let slabs = Slabs::new(ray);
-        for index in on_the_way.iter().map(|&index| usize::from(index)).filter(|&i| i != object) {
+        let ray = LazyCell::new(|| Ray { origin: place, dir: way * (R::of(1.0) / far) });
+        let slabs = LazyCell::new(|| Slabs::new(&ray));
+        for index in on_the_way.iter().map(|&index| index as usize).filter(|&i| i != object) {
             let seer = &self.seers[index];
             let is_near = || slabs.entry(&seer.bounds, R::of(0.0), far).is_some();
-            if share.get() > 0.0 && is_near() && seer.hides(light, ray, far) {
+            let is_met = || (seer.has_closed_form() || is_near()) && seer.is_met(&ray, far);
+            if share.get() > 0.0 && seer.hides_by_map(light, -way).unwrap_or_else(is_met) {
                 share = share * R::of(seer.material().translucence());
             }
         }

@@ -15,6 +15,7 @@
 
 mod around;
 mod cube;
+mod in_view;
 mod lazy;
 mod light_map;
 mod light_path;
@@ -32,10 +33,11 @@ use rayon::prelude::*;
 use super::Control;
 use super::project::tiles;
 use crate::error::Result;
-use crate::geometry::{Bounds, Real, Region, Vec3};
+use crate::geometry::{Bounds, Real, Region};
 use crate::ritree::{BuildCounts, Cache, Parameters};
 use crate::scene::trace::{Camera, World};
 use around::Around;
+use in_view::InView;
 use light_path::LightPath;
 pub use picture::{Picture, Samples};
 use seer::Seer;
@@ -102,6 +104,8 @@ pub struct Renderer<'a, R: Real> {
     /// The boxes around the objects, and which of them lie where around each light.
     boxes: Vec<Bounds>,
     lights: Vec<Around>,
+    /// The order in which rays are held against objects: quick ones first, which leave less of the ray to search.
+    order: Vec<u32>,
     cache: Cache,
     kept_share: f64,
     clock: AtomicU32,
@@ -116,13 +120,16 @@ impl<'a, R: Real> Renderer<'a, R> {
         };
         let seers = world.objects.iter().map(|object| Seer::new(object, world, parameters)).collect();
         let boxes: Vec<Bounds> = world.objects.iter().map(|object| object.surface.bounds()).collect();
-        let lights = world.lights.iter().map(|light| Around::new(light.position, &boxes)).collect();
+        let mut order: Vec<u32> = (0..world.objects.len() as u32).collect();
+        order.sort_by_key(|&index| !world.objects[index as usize].surface.has_closed_form());
+        let lights = world.lights.iter().map(|light| Around::new(light.position, &boxes, &order)).collect();
         Self {
             world,
             sky: SkyMap::new(&world.sky),
             seers: RwLock::new(seers),
             boxes,
             lights,
+            order,
             cache: Cache::new(settings.cache_bytes),
             kept_share: settings.kept_share,
             clock: AtomicU32::new(1),
@@ -140,7 +147,8 @@ impl<'a, R: Real> Renderer<'a, R> {
         samples: &Samples,
         control: &Control,
     ) -> Result<Picture> {
-        let view = View { camera, size, samples, around: Around::new(camera.eye(), &self.boxes) };
+        let in_view = InView::new(camera, size, &self.world.objects, &self.boxes, &self.order);
+        let view = View { camera, size, samples, in_view };
         let tiles: Vec<(Region, Tile)> = tiles(size)
             .into_par_iter()
             .map(|region| {
@@ -177,17 +185,22 @@ impl<'a, R: Real> Renderer<'a, R> {
         let seers = self.enter();
         let now = self.clock.fetch_add(1, Ordering::Relaxed);
         seers.iter().for_each(|seer| seer.tick_to(now));
-        let mut light =
-            LightPath::new(self.world, &self.sky, &view.around, &self.lights, &seers, &self.cache);
+        let in_view = view.in_view.on(region);
+        let mut light = LightPath::new(self, &seers, view.camera, &in_view);
+        let mut rays = view.camera.rays(view.size);
         let mut tile = Tile::default();
         for (column, row) in region.places() {
             light.was_traced = false;
             let places = view.samples.of_pixel(column, row);
-            let sum = places.fold(Vec3::default(), |sum, [x, y]| {
-                let ray = view.camera.ray(view.size, f64::from(column) + x, f64::from(row) + y);
-                sum + light.seen(&ray)
+            let seen = places.map(|[x, y]| {
+                let place = [f64::from(column) + x, f64::from(row) + y];
+                light.seen(&rays.through(place), place)
             });
-            let mean = sum * R::of(1.0 / f64::from(view.samples.count()));
+            let sum = seen.reduce(|sum, colour| sum + colour).unwrap_or_default();
+            let mean = match view.samples.count() {
+                1 => sum,
+                count => sum * R::of(1.0 / f64::from(count)),
+            };
             tile.colours.push(mean.get().as_vec3().to_array());
             tile.traced.push(light.was_traced);
         }
@@ -211,8 +224,7 @@ struct View<'a> {
     camera: &'a Camera,
     size: (u32, u32),
     samples: &'a Samples,
-    /// Which objects lie where around the camera.
-    around: Around,
+    in_view: InView,
 }
 
 /// The pixels of one tile, row by row.

@@ -64,6 +64,10 @@ pub struct Seer<'a, R: Real> {
     /// Where it hides each light, for objects with a tree.
     shadows: Vec<LightMap<'a>>,
     lights: Vec<DVec3>,
+    /// What it shows of the ambient light.
+    pub ambient: DVec3,
+    /// What it scatters of each light that it faces.
+    pub scattered: Vec<DVec3>,
     /// The cosine to a light's mirrored ray above which a highlight is seen.
     pub highlight_from: f64,
     optics: Option<Optics>,
@@ -95,8 +99,19 @@ impl<'a, R: Real> Seer<'a, R> {
         let map = |&light: &DVec3| LightMap::new(&object.surface, light, threshold);
         let shadows = if tree.is_some() { lights.iter().map(map).collect() } else { Vec::new() };
         let bounds = object.surface.bounds();
-        let highlight_from = LEAST_HIGHLIGHT.powf(1.0 / object.material.shininess);
-        Self { object, bounds, shadows, lights, highlight_from, optics, limit, tree }
+        let Material { colour, ambient, diffuse, shininess, .. } = object.material;
+        Self {
+            object,
+            bounds,
+            shadows,
+            lights,
+            ambient: ambient * colour * world.ambient,
+            scattered: world.lights.iter().map(|light| diffuse * colour * light.colour).collect(),
+            highlight_from: LEAST_HIGHLIGHT.powf(1.0 / shininess),
+            optics,
+            limit,
+            tree,
+        }
     }
 
     /// Its material.
@@ -108,6 +123,11 @@ impl<'a, R: Real> Seer<'a, R> {
     pub fn is_flat(&self) -> bool {
         matches!(self.object.surface, Surface::Disc(_) | Surface::Block(_))
             && self.optics == Some(Optics::Mirror)
+    }
+
+    /// Whether its hits take few operations.
+    pub fn has_closed_form(&self) -> bool {
+        self.object.surface.has_closed_form()
     }
 
     /// Whether it has a tree.
@@ -122,23 +142,32 @@ impl<'a, R: Real> Seer<'a, R> {
         Some(Sight { t: hit.t, place: hit.place(ray), normal, known: Known::Traced(hit) })
     }
 
-    /// Whether it hides a light of the world from a place of another object. `ray` leads from there to the light, `far` away.
-    /// Traced, that stops at any hit.
-    pub fn hides(&self, light: usize, ray: &Ray<R>, far: R) -> bool {
-        match self.shadows.get(light) {
-            Some(map) => map.hides(ray.origin),
-            None => self.object.surface.is_met(ray, Reach { to: far, ..Reach::whole() }),
-        }
+    /// Whether it hides a light of the world from a place of another object that lies `way` from the light, by its map. `None` if it
+    /// has none.
+    pub fn hides_by_map(&self, light: usize, way: Vec3<R>) -> Option<bool> {
+        self.shadows.get(light).map(|map| map.hides(way))
     }
 
-    /// Whether it hides a light from a place of its own, seen along `ray`, which faces the light at this cosine.
-    pub fn hides_itself(&self, light: usize, ray: &Ray<R>, sight: &Sight<R>, cosine: R) -> bool {
+    /// Whether a ray meets it anywhere within `far`.
+    pub fn is_met(&self, ray: &Ray<R>, far: R) -> bool {
+        self.object.surface.is_met(ray, Reach { to: far, ..Reach::whole() })
+    }
+
+    /// Whether it hides a light from a place of its own, seen along `ray`, which lies `way` from the light and faces it at this cosine.
+    pub fn hides_itself(
+        &self,
+        light: usize,
+        way: Vec3<R>,
+        ray: &Ray<R>,
+        sight: &Sight<R>,
+        cosine: R,
+    ) -> bool {
         // Convex surfaces hide no place of theirs that faces the light.
         if self.object.is_convex {
             return false;
         }
         match (self.shadows.get(light), sight.known) {
-            (Some(map), _) => map.hides_itself(sight.place, cosine),
+            (Some(map), _) => map.hides_itself(way, cosine),
             (None, Known::Traced(hit)) => self.is_met_again(ray, &hit, self.lights[light]),
             (None, Known::Told(_)) => false,
         }

@@ -74,9 +74,9 @@ fn what_trees_tell_has_directions_of_unit_length() {
         let cache = Cache::new(settings.cache_bytes);
         for object in world.objects.iter().filter(|object| object.grows) {
             let seer = Seer::<f64>::new(object, &world, Some(settings.parameters));
-            let mut asker = seer.asker();
+            let (mut asker, mut rays) = (seer.asker(), world.cameras[0].rays(SIZE));
             for (column, row) in (0..SIZE.0).flat_map(|x| (0..SIZE.1).map(move |y| (x, y))) {
-                let ray = world.cameras[0].ray(SIZE, f64::from(column), f64::from(row));
+                let ray = rays.through([f64::from(column), f64::from(row)]);
                 let Ok(Some(sight)) = asker.ask(&ray, &cache) else { continue };
                 assert!((sight.normal.length() - 1.0).abs() < 1e-14, "{:?}", sight.normal);
                 if let Some((on, _)) = seer.turned(&ray, &sight) {

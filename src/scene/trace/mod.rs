@@ -15,7 +15,7 @@ use std::path::Path;
 
 pub use generate::{bezier_surface, random_volumes};
 pub use noise::Noise;
-pub use world::{Camera, Glass, Light, Material, Object, Sky, World};
+pub use world::{Camera, CameraRays, Footprint, Glass, Light, Material, Object, Sky, SkyFrom, World};
 
 use super::folder::Folder;
 use super::regular_file;

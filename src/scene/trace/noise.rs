@@ -1,9 +1,8 @@
 //! Gradient noise: smooth, seeded, the same everywhere.
 
-use crate::geometry::{Real, Vec3};
+use std::ops::Range;
 
-/// Octaves of turbulence; the finest is 1/16 of the first wave.
-const OCTAVES: i32 = 5;
+use crate::geometry::{Real, Vec3};
 
 /// Perlin's gradient noise (2002, doi:10.1145/566654.566636) on a seeded lattice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,8 +11,11 @@ pub struct Noise {
 }
 
 impl Noise {
+    /// Octaves of turbulence; the finest is 1/16 of the first wave.
+    pub const OCTAVES: i32 = 5;
+
     /// Cells of the finest octave's lattice along the first one's.
-    pub const FINEST: f64 = (1 << (OCTAVES - 1)) as f64;
+    pub const FINEST: f64 = (1 << (Self::OCTAVES - 1)) as f64;
 
     /// The noise of a seed.
     pub fn new(seed: u64) -> Self {
@@ -22,11 +24,19 @@ impl Noise {
 
     /// Noise of several octaves, each of half the amplitude: 0 to 1.
     pub fn turbulence<R: Real>(&self, place: Vec3<R>) -> R {
-        let sum = (0..OCTAVES).fold(R::of(0.0), |sum, octave| {
+        Self::share_of(self.octaves(place, 0..Self::OCTAVES))
+    }
+
+    /// What octaves add up to.
+    pub fn octaves<R: Real>(&self, place: Vec3<R>, octaves: Range<i32>) -> R {
+        octaves.fold(R::of(0.0), |sum, octave| {
             let scale = 2f64.powi(octave);
             sum + self.at(place * R::of(scale)) * R::of(1.0 / scale)
-        });
-        // Octaves seldom add up to more than 0.7.
+        })
+    }
+
+    /// The turbulence that octaves add up to, which is seldom more than 0.7.
+    pub fn share_of<R: Real>(sum: R) -> R {
         (R::of(0.5) + sum * R::of(0.7)).max(R::of(0.0)).min(R::of(1.0))
     }
 

@@ -1,9 +1,11 @@
 //! What is rendered: objects with materials, lights, a sky and cameras.
 
-use glam::DVec3;
+use std::ops::Range;
+
+use glam::{DVec2, DVec3};
 
 use super::noise::Noise;
-use crate::geometry::{Ray, Real, Vec3};
+use crate::geometry::{Bounds, Ray, Real, Region, Vec3};
 use crate::surface::Surface;
 use crate::surface::optics::Optics;
 
@@ -125,22 +127,43 @@ pub struct Sky {
 }
 
 impl Sky {
-    /// Where a ray meets it, from its centre.
-    pub fn place<R: Real>(&self, ray: &Ray<R>) -> Vec3<R> {
-        let off = ray.origin - Vec3::of(self.centre);
-        let middle = off.dot(ray.dir);
-        let under = middle * middle - off.dot(off) + R::of(self.radius * self.radius);
-        off + ray.dir * (under.max(R::of(0.0)).sqrt() - middle)
+    /// As it is seen from a place.
+    pub fn from<R: Real>(&self, origin: Vec3<R>) -> SkyFrom<R> {
+        let off = origin - Vec3::of(self.centre);
+        SkyFrom { off, power: R::of(self.radius * self.radius) - off.dot(off) }
     }
 
     /// How far its noise is from the first colour to the second at a place on it, 0 to 1.
     pub fn share<R: Real>(&self, place: Vec3<R>) -> R {
-        self.noise.turbulence(place * R::of(self.frequency / self.radius))
+        Noise::share_of(self.octaves(place, 0..Noise::OCTAVES))
+    }
+
+    /// What octaves of its noise add up to at a place on it.
+    pub fn octaves<R: Real>(&self, place: Vec3<R>, octaves: Range<i32>) -> R {
+        self.noise.octaves(place * R::of(self.frequency / self.radius), octaves)
     }
 
     /// The colour of a share.
     pub fn colour<R: Real>(&self, share: R) -> Vec3<R> {
         Vec3::of(self.colours[0]) + Vec3::of(self.colours[1] - self.colours[0]) * share
+    }
+}
+
+/// A sky as it is seen from one place.
+#[derive(Clone, Copy, Debug)]
+pub struct SkyFrom<R> {
+    /// The place, from the sky's centre.
+    off: Vec3<R>,
+    /// The squared radius less the squared distance to the centre.
+    power: R,
+}
+
+impl<R: Real> SkyFrom<R> {
+    /// Where it is met in a unit direction, from its centre.
+    pub fn place(&self, dir: Vec3<R>) -> Vec3<R> {
+        let middle = self.off.dot(dir);
+        let under = middle * middle + self.power;
+        self.off + dir * (under.max(R::of(0.0)).sqrt() - middle)
     }
 }
 
@@ -176,12 +199,94 @@ impl Camera {
         self.eye
     }
 
-    /// The ray through (x, y) of a picture of `columns` × `rows`, pixels from its upper left corner.
-    pub fn ray<R: Real>(&self, (columns, rows): (u32, u32), x: f64, y: f64) -> Ray<R> {
-        let across = R::of(2.0 * self.slope / f64::from(columns));
-        let right = (R::of(x) - R::of(0.5 * f64::from(columns))) * across;
-        let down = (R::of(y) - R::of(0.5 * f64::from(rows))) * across;
-        let dir = Vec3::of(self.forward) + Vec3::of(self.right) * right - Vec3::of(self.up) * down;
-        Ray { origin: Vec3::of(self.eye), dir: dir.normalized() }
+    /// It as maps of places and of ways make it: a mirror's.
+    pub fn mirrored(&self, place: impl Fn(DVec3) -> DVec3, way: impl Fn(DVec3) -> DVec3) -> Self {
+        let [forward, right, up] = [self.forward, self.right, self.up].map(way);
+        Self { eye: place(self.eye), forward, right, up, ..*self }
+    }
+
+    /// Where a box may be seen in a picture of `columns` × `rows` pixels. `None` if it lies behind the camera.
+    pub fn footprint(&self, (columns, rows): (u32, u32), bounds: &Bounds) -> Option<Footprint> {
+        let ways = bounds.corners().map(|corner| corner - self.eye);
+        let is_before = |way: &DVec3| way.dot(self.forward) > f64::EPSILON * way.length();
+        if !ways.iter().any(is_before) {
+            return None;
+        }
+        // A box that reaches beside the eye or behind it may be seen anywhere.
+        if !ways.iter().all(is_before) {
+            return Some(Footprint::ANYWHERE);
+        }
+        let middle = 0.5 * DVec2::new(columns.into(), rows.into());
+        let pixels = 0.5 * f64::from(columns) / self.slope;
+        let places = ways.map(|way| {
+            middle + DVec2::new(way.dot(self.right), -way.dot(self.up)) * (pixels / way.dot(self.forward))
+        });
+        let [low, high] = [DVec2::min, DVec2::max].map(|of| places.into_iter().reduce(of).unwrap_or(middle));
+        Some(Footprint { low: low - PIXEL_ROUNDING, high: high + PIXEL_ROUNDING })
+    }
+
+    /// The rays of a picture of `columns` × `rows` pixels.
+    pub fn rays<R: Real>(&self, (columns, rows): (u32, u32)) -> CameraRays<R> {
+        let across = 2.0 * self.slope / f64::from(columns);
+        let (right, down) = (across * self.right, -across * self.up);
+        let corner = self.forward - 0.5 * (f64::from(columns) * right + f64::from(rows) * down);
+        CameraRays {
+            eye: Vec3::of(self.eye),
+            corner: Vec3::of(corner),
+            right: Vec3::of(right),
+            down: Vec3::of(down),
+            row: (0.0, Vec3::of(corner)),
+        }
+    }
+}
+
+/// What rounding moves a place in a picture by, at most, pixels.
+const PIXEL_ROUNDING: f64 = 1e-3;
+
+/// The part of a picture where something may be seen, pixels from the upper left corner.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Footprint {
+    low: DVec2,
+    high: DVec2,
+}
+
+impl Footprint {
+    /// Without bounds.
+    pub const ANYWHERE: Self = Self { low: DVec2::NEG_INFINITY, high: DVec2::INFINITY };
+
+    /// Whether something may be seen at a place.
+    pub fn holds(&self, place: [f64; 2]) -> bool {
+        (0..2).all(|axis| (self.low[axis]..=self.high[axis]).contains(&place[axis]))
+    }
+
+    /// Whether it has something of a region's pixels.
+    pub fn reaches(&self, region: &Region) -> bool {
+        let is_beside = |axis: usize, pixels: &Range<u32>| {
+            self.high[axis] < f64::from(pixels.start) || self.low[axis] > f64::from(pixels.end)
+        };
+        !is_beside(0, &region.columns) && !is_beside(1, &region.rows)
+    }
+}
+
+/// The rays of a camera's picture, one after another: those of one row have much in common.
+#[derive(Clone, Copy, Debug)]
+pub struct CameraRays<R> {
+    eye: Vec3<R>,
+    /// The way from the eye to the upper left corner of the picture, and on by a pixel.
+    corner: Vec3<R>,
+    right: Vec3<R>,
+    down: Vec3<R>,
+    /// The last ray's row, and the way to where it begins.
+    row: (f64, Vec3<R>),
+}
+
+impl<R: Real> CameraRays<R> {
+    /// The ray through (x, y), pixels from the upper left corner.
+    pub fn through(&mut self, [x, y]: [f64; 2]) -> Ray<R> {
+        if self.row.0 != y {
+            self.row = (y, self.corner + self.down * R::of(y));
+        }
+        let way = self.row.1 + self.right * R::of(x);
+        Ray { origin: self.eye, dir: way.normalized() }
     }
 }
