@@ -65,7 +65,7 @@ const DEPTH_ROUNDING: f64 = 2.0 * f32::EPSILON as f64;
 /// What of a mirrored ray's way to the farthest things counts as its lever: it turns twice as far as the normal, but much of
 /// what it shows is nearer. Measured, it keeps pictures of a waving sheet and of a bowl truer than the paper's at the paper's
 /// thresholds; a quarter more would cost 3 % more operations of the sheet for an eighth less error.
-const LEVERAGE: f64 = 0.28;
+const LEVERAGE: f64 = 0.265;
 
 /// The attribute of objects that mirror or refract.
 ///

@@ -96,14 +96,22 @@ impl<'a> SurfaceLines<'a> {
 
     /// A ray's line as its tree knows it.
     pub fn point<R: Real>(&self, ray: &Ray<R>) -> LinePoint {
-        let pair = self.space.pair_of(ray.dir);
+        self.point_from(self.off(ray.origin), ray.dir)
+    }
+
+    /// A place from the cube's middle, box units.
+    pub fn off<R: Real>(&self, place: Vec3<R>) -> Vec3<R> {
+        (place - Vec3::of(self.middle)) * R::of(1.0 / self.side())
+    }
+
+    /// The line through a place that lies [`off`](Self::off) the middle.
+    pub fn point_from<R: Real>(&self, off: Vec3<R>, dir: Vec3<R>) -> LinePoint {
+        let pair = self.space.pair_of(dir);
         let [k, i, j] = pair.axes();
-        let side = R::of(1.0 / self.space.size()[k]);
-        let over = R::of(1.0) / ray.dir.axis(k);
-        let at = |axis: usize| (ray.origin.axis(axis) - R::of(self.middle[axis])) * side;
-        let slope = [ray.dir.axis(i) * over, ray.dir.axis(j) * over];
-        let depth = at(k);
-        let off = [at(i) - depth * slope[0], at(j) - depth * slope[1]];
+        let over = R::of(1.0) / dir.axis(k);
+        let slope = [dir.axis(i) * over, dir.axis(j) * over];
+        let depth = off.axis(k);
+        let off = [off.axis(i) - depth * slope[0], off.axis(j) - depth * slope[1]];
         let half = R::of(0.5);
         let stuv = [
             half + off[0] * R::of(OFFSET_SCALE),

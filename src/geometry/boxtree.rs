@@ -67,6 +67,19 @@ impl BoxTree {
         self.nodes.is_empty()
     }
 
+    /// At most so many boxes, one at the least, that hold all items: those of one level of the hierarchy.
+    pub fn parts(&self, at_most: usize) -> Vec<Bounds> {
+        let mut level: Vec<u32> = self.nodes.first().map(|_| 0).into_iter().collect();
+        loop {
+            let below = |&node: &u32| self.children(node).map_or(vec![node], Vec::from);
+            let next: Vec<u32> = level.iter().flat_map(below).collect();
+            if next.len() == level.len() || next.len() > at_most {
+                return level.into_iter().map(|node| self.bounds_of(node)).collect();
+            }
+            level = next;
+        }
+    }
+
     /// The box of a node; node 0 is the root.
     pub(crate) fn bounds_of(&self, node: u32) -> Bounds {
         self.nodes[node as usize].bounds
@@ -323,6 +336,19 @@ mod tests {
         let brute: Vec<u32> = (0..500).filter(|&i| boxes[i as usize].touches(&window)).collect();
         assert!(!brute.is_empty());
         assert_eq!(found, brute);
+    }
+
+    #[test]
+    fn parts_hold_all_items_and_are_no_more_than_asked_for() {
+        let boxes = random_boxes(5, 300);
+        let tree = BoxTree::build(&boxes);
+        for at_most in [1, 2, 10, 100, 1_000] {
+            let parts = tree.parts(at_most);
+            let holds = |part: &Bounds, item: &Bounds| part.union(*item) == *part;
+            assert!((1..=at_most).contains(&parts.len()) && parts.len() > at_most.min(100) / 4);
+            assert!(boxes.iter().all(|item| parts.iter().any(|part| holds(part, item))), "{at_most}");
+        }
+        assert!(BoxTree::build(&[]).parts(3).is_empty());
     }
 
     #[test]

@@ -51,9 +51,9 @@ impl SmoothMesh {
         &self.mesh.vertices
     }
 
-    /// The boxes around its faces.
-    pub fn parts(&self) -> impl Iterator<Item = Bounds> + '_ {
-        self.mesh.faces.iter().map(|face| Bounds::of(face.map(|i| self.mesh.vertices[i as usize])))
+    /// At most so many boxes around all of its faces.
+    pub fn parts(&self, at_most: usize) -> Vec<Bounds> {
+        self.tree.parts(at_most)
     }
 
     /// The nearest hit within reach. `None` if there is none. Shared edges are counted in at least one face (Woop, Benthin

@@ -169,11 +169,11 @@ impl Surface {
         matches!(self, Self::Sphere(_) | Self::Disc(_) | Self::Block(_))
     }
 
-    /// Boxes that hold all of the surface, each a part of it.
-    pub fn parts(&self) -> Vec<Bounds> {
+    /// At most so many boxes that hold all of the surface, each a part of it.
+    pub fn parts(&self, at_most: usize) -> Vec<Bounds> {
         match self {
-            Self::Shell(s) => s.parts().collect(),
-            Self::Mesh(s) => s.parts().collect(),
+            Self::Shell(s) => s.parts(at_most),
+            Self::Mesh(s) => s.parts(at_most),
             simple => vec![simple.bounds()],
         }
     }

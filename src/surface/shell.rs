@@ -44,9 +44,9 @@ impl Shell {
         &self.patches
     }
 
-    /// The boxes around its pieces.
-    pub fn parts(&self) -> impl Iterator<Item = Bounds> + '_ {
-        self.pieces.iter().map(|piece| piece.bounds)
+    /// At most so many boxes around all of its pieces.
+    pub fn parts(&self, at_most: usize) -> Vec<Bounds> {
+        self.tree.parts(at_most)
     }
 
     /// All control points.

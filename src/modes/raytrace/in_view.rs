@@ -4,13 +4,14 @@
 //! What a pixel shows in a flat mirror is what it would show of the mirrored camera, so that boxes cast shadows on the picture
 //! from there as well. Exact tracing and trees both hold rays against these objects alone, and it takes them no operation.
 
+use super::shadow::Shadow;
 use crate::geometry::{Bounds, Region};
-use crate::scene::trace::{Camera, Footprint, Object};
+use crate::scene::trace::{Camera, Object};
 use crate::surface::Surface;
 use crate::surface::optics::Optics;
 
 /// Objects and where in the picture they may be seen, in the order in which rays are held against them.
-type Seen = Vec<(u32, Footprint)>;
+type Seen = Vec<(u32, Shadow)>;
 
 /// Where in a picture, or on a part of it, objects may be seen.
 pub struct InView {
@@ -31,8 +32,10 @@ impl InView {
         order: &[u32],
     ) -> Self {
         let seen_by = |camera: &Camera| {
-            let footprint = |&i: &u32| Some((i, camera.footprint(size, &boxes[i as usize])?));
-            order.iter().filter_map(footprint).collect()
+            let shadow = |&i: &u32| {
+                Some((i, Shadow::new(&objects[i as usize].surface, &boxes[i as usize], camera, size)?))
+            };
+            order.iter().filter_map(shadow).collect()
         };
         let in_mirror = |&mirror: &u32| {
             let Object { surface: Surface::Disc(disc), material, .. } = &objects[mirror as usize] else {
@@ -43,7 +46,7 @@ impl InView {
             Some((mirror, seen_by(&image)))
         };
         Self {
-            anyhow: order.iter().map(|&index| (index, Footprint::ANYWHERE)).collect(),
+            anyhow: order.iter().map(|&index| (index, Shadow::ANYWHERE)).collect(),
             straight: seen_by(camera),
             mirrored: order.iter().filter_map(in_mirror).collect(),
         }
@@ -51,8 +54,7 @@ impl InView {
 
     /// On a tile of it.
     pub fn on(&self, tile: &Region) -> Self {
-        let reach =
-            |seen: &Seen| seen.iter().copied().filter(|(_, footprint)| footprint.reaches(tile)).collect();
+        let reach = |seen: &Seen| seen.iter().filter(|(_, shadow)| shadow.reaches(tile)).cloned().collect();
         Self {
             anyhow: self.anyhow.clone(),
             straight: reach(&self.straight),
@@ -61,17 +63,17 @@ impl InView {
     }
 
     /// By rays that come from anywhere.
-    pub fn anyhow(&self) -> &[(u32, Footprint)] {
+    pub fn anyhow(&self) -> &[(u32, Shadow)] {
         &self.anyhow
     }
 
     /// By rays from the camera.
-    pub fn straight(&self) -> &[(u32, Footprint)] {
+    pub fn straight(&self) -> &[(u32, Shadow)] {
         &self.straight
     }
 
     /// By rays from the camera that an object mirrored.
-    pub fn mirrored_by(&self, object: usize) -> &[(u32, Footprint)] {
+    pub fn mirrored_by(&self, object: usize) -> &[(u32, Shadow)] {
         let of_mirror = self.mirrored.iter().find(|(index, _)| *index as usize == object);
         of_mirror.map_or(&self.anyhow, |(_, seen)| seen)
     }
@@ -99,6 +101,8 @@ mod tests {
         let mut objects = vec![like(Surface::Disc(mirror))];
         let ball = |i: u32| Sphere::new(vector(100.0), 1.0 + f64::from(i)).expect("a sphere");
         objects.extend((0..30).map(ball).map(|ball| like(Surface::Sphere(ball))));
+        // A bowl, a sheet and a tomato, whose parts are told apart.
+        objects.extend([1, 6, 7].map(|index| like(world.objects[index].surface.clone())));
         let boxes: Vec<Bounds> = objects.iter().map(|object| object.surface.bounds()).collect();
         let order: Vec<u32> = (0..objects.len() as u32).rev().collect();
         let (size, mut met, mut held, mut all) = ((40, 30), [0; 2], 0, 0);
@@ -111,10 +115,10 @@ mod tests {
                 let in_view = whole.on(&Region { columns: column..column + 1, rows: row..row + 1 });
                 let place = [f64::from(column) + 0.3, f64::from(row) + 0.9];
                 let ray = rays.through(place);
-                let mut hold = |ray: &Ray<f64>, seen: &[(u32, Footprint)], mirror: Option<usize>| {
+                let mut hold = |ray: &Ray<f64>, seen: &[(u32, Shadow)], mirror: Option<usize>| {
                     for (index, object) in objects.iter().enumerate().filter(|(i, _)| Some(*i) != mirror) {
                         let is_met = object.surface.hit(ray, Reach::whole()).is_some();
-                        let mut at_place = seen.iter().filter(|(_, footprint)| footprint.holds(place));
+                        let mut at_place = seen.iter().filter(|(_, shadow)| shadow.holds(place));
                         met[usize::from(mirror.is_some())] += usize::from(is_met);
                         let is_seen = at_place.any(|(i, _)| *i as usize == index);
                         assert!(

@@ -27,6 +27,9 @@ const SIDE: usize = 96;
 /// of the object's width, may slip between its points where another part of the object lies behind it.
 const BLOCKS: [usize; 2] = [4, 2];
 
+/// The parts of the surface that are told apart to know which cells are never met, at most.
+const MOST_PARTS: usize = 4096;
+
 /// A block is flat if its inner points are off by no more than the slack. Between the points of its cells, of half the
 /// width, depths then are off by a quarter of that where the surface is smooth, and by half of it at a crease: this share is
 /// left aside around what decides.
@@ -186,7 +189,7 @@ impl Lattice {
     /// Nothing is known, but for the cells that no box around a part of the surface covers.
     fn table(&self, map: &LightMap) -> Table {
         let mut may_be_met = vec![false; SIDE * SIDE];
-        for part in map.surface.parts() {
+        for part in map.surface.parts(MOST_PARTS) {
             let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
             for corner in part.corners() {
                 let at = slope(self.axis, self.is_downward, corner - map.light);

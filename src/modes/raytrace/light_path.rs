@@ -52,7 +52,7 @@ impl<'t, 'a, R: Real> LightPath<'t, 'a, R> {
         Self {
             renderer,
             seers,
-            askers: seers.iter().map(Seer::asker).collect(),
+            askers: seers.iter().map(|seer| seer.asker(camera.eye())).collect(),
             in_view,
             place: [0.0; 2],
             sky_from_eye: renderer.world.sky.from(Vec3::of(camera.eye())),
@@ -137,7 +137,7 @@ impl<'t, 'a, R: Real> LightPath<'t, 'a, R> {
             Bundle::FromImage(None) | Bundle::Scattered => in_view.anyhow(),
         };
         let place = self.place;
-        let objects = objects.iter().filter(|(_, footprint)| footprint.holds(place));
+        let objects = objects.iter().filter(|(_, shadow)| shadow.holds(place));
         let slabs = LazyCell::new(|| Slabs::new(ray));
         let mut best: Option<(usize, Sight<R>)> = None;
         for index in objects.map(|(index, _)| *index as usize).filter(|&index| Some(index) != left) {
@@ -174,7 +174,9 @@ impl<'t, 'a, R: Real> LightPath<'t, 'a, R> {
             // The tree knows the first hit of the whole line: it serves where that lies ahead.
             if bundle != Bundle::Scattered && near.get() > 0.0 {
                 self.work.queries += 1;
-                if let Ok(answer) = self.askers[index].ask(ray, &self.renderer.cache) {
+                if let Ok(answer) =
+                    self.askers[index].ask(ray, bundle == Bundle::FromEye, &self.renderer.cache)
+                {
                     self.work.interpolated += 1;
                     return answer.filter(|sight| sight.t <= to);
                 }

@@ -21,6 +21,7 @@ mod light_map;
 mod light_path;
 mod picture;
 mod seer;
+mod shadow;
 mod sky_map;
 #[cfg(test)]
 mod tests;
@@ -41,6 +42,7 @@ use in_view::InView;
 use light_path::LightPath;
 pub use picture::{Picture, Samples};
 use seer::Seer;
+pub(super) use shadow::Shadow;
 use sky_map::SkyMap;
 
 /// How trees of what rays meet are grown; the defaults are the paper's.

@@ -46,7 +46,13 @@ enum Tree<'a, R: Real> {
 }
 
 /// Asks an object's tree for one ray after another.
-pub enum Asker<'t, 'a, R: Real> {
+pub struct Asker<'t, 'a, R: Real> {
+    way: Way<'t, 'a, R>,
+    /// Where the camera is, [off](SurfaceLines::off) the tree's middle.
+    eye: Vec3<R>,
+}
+
+enum Way<'t, 'a, R: Real> {
     /// There is no tree.
     None,
     /// Of an object that turns no rays.
@@ -185,12 +191,17 @@ impl<'a, R: Real> Seer<'a, R> {
             .is_met(&Ray { origin: place, dir }, Reach { from, to: far, left: hit.part, ..Reach::whole() })
     }
 
-    /// To ask the tree by rays whose origins lie before the object's box.
-    pub fn asker(&self) -> Asker<'_, 'a, R> {
+    /// To ask the tree by rays whose origins lie before the object's box, many of which come from a camera's `eye`.
+    pub fn asker(&self, eye: DVec3) -> Asker<'_, 'a, R> {
+        let eye = Vec3::of(eye);
         match &self.tree {
-            None => Asker::None,
-            Some(Tree::Seen(tree)) => Asker::Seen(tree.descent()),
-            Some(Tree::Through(tree)) => Asker::Through(tree.descent()),
+            None => Asker { way: Way::None, eye },
+            Some(Tree::Seen(tree)) => {
+                Asker { eye: tree.attribute().lines().off(eye), way: Way::Seen(tree.descent()) }
+            }
+            Some(Tree::Through(tree)) => {
+                Asker { eye: tree.attribute().lines().off(eye), way: Way::Through(tree.descent()) }
+            }
         }
     }
 
@@ -253,19 +264,29 @@ impl<'a, R: Real> Seer<'a, R> {
 }
 
 impl<R: Real> Asker<'_, '_, R> {
-    /// The first sight of the object. `Err` says why the ray is to be traced.
-    pub fn ask(&mut self, ray: &Ray<R>, cache: &Cache) -> Result<Option<Sight<R>>, Reason> {
-        match self {
-            Self::None => Err(Reason::Guard),
-            Self::Seen(descent) => {
+    /// The first sight of the object along a ray; its line may be one through the eye. `Err` says why it is to be traced.
+    pub fn ask(
+        &mut self,
+        ray: &Ray<R>,
+        is_from_eye: bool,
+        cache: &Cache,
+    ) -> Result<Option<Sight<R>>, Reason> {
+        let eye = is_from_eye.then_some(self.eye);
+        let point_of = |lines: &SurfaceLines| match eye {
+            Some(eye) => lines.point_from(eye, ray.dir),
+            None => lines.point(ray),
+        };
+        match &mut self.way {
+            Way::None => Err(Reason::Guard),
+            Way::Seen(descent) => {
                 let lines = descent.tree().attribute().lines();
-                let point = lines.point(ray);
+                let point = point_of(lines);
                 let seen = answer(descent.query(point, cache))?;
                 Ok(seen.and_then(|seen| sight(lines, ray, point, &seen, |_, _| None)))
             }
-            Self::Through(descent) => {
+            Way::Through(descent) => {
                 let exits = descent.tree().attribute();
-                let point = exits.lines().point(ray);
+                let point = point_of(exits.lines());
                 let through = answer(descent.query(point, cache))?;
                 Ok(through.and_then(|through| {
                     let turned = |place, normal| {

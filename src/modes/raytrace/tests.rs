@@ -74,10 +74,11 @@ fn what_trees_tell_has_directions_of_unit_length() {
         let cache = Cache::new(settings.cache_bytes);
         for object in world.objects.iter().filter(|object| object.grows) {
             let seer = Seer::<f64>::new(object, &world, Some(settings.parameters));
-            let (mut asker, mut rays) = (seer.asker(), world.cameras[0].rays(SIZE));
+            let camera = &world.cameras[0];
+            let (mut asker, mut rays) = (seer.asker(camera.eye()), camera.rays(SIZE));
             for (column, row) in (0..SIZE.0).flat_map(|x| (0..SIZE.1).map(move |y| (x, y))) {
                 let ray = rays.through([f64::from(column), f64::from(row)]);
-                let Ok(Some(sight)) = asker.ask(&ray, &cache) else { continue };
+                let Ok(Some(sight)) = asker.ask(&ray, true, &cache) else { continue };
                 assert!((sight.normal.length() - 1.0).abs() < 1e-14, "{:?}", sight.normal);
                 if let Some((on, _)) = seer.turned(&ray, &sight) {
                     assert!((on.dir.length() - 1.0).abs() < 1e-14, "{:?}", on.dir);

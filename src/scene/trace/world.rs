@@ -259,6 +259,16 @@ impl Footprint {
         (0..2).all(|axis| (self.low[axis]..=self.high[axis]).contains(&place[axis]))
     }
 
+    /// The cells of so many pixels along each side that it reaches in a picture of `columns` × `rows`. `None` if it lies beside the
+    /// picture.
+    pub fn cells(&self, (columns, rows): (u32, u32), side: usize) -> Option<[Range<usize>; 2]> {
+        let along = |axis: usize, size: u32| {
+            let (low, high) = (self.low[axis].max(0.0), self.high[axis].min(f64::from(size)));
+            (low <= high).then(|| low as usize / side..high as usize / side + 1)
+        };
+        Some([along(0, columns)?, along(1, rows)?])
+    }
+
     /// Whether it has something of a region's pixels.
     pub fn reaches(&self, region: &Region) -> bool {
         let is_beside = |axis: usize, pixels: &Range<u32>| {
