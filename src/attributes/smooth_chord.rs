@@ -44,18 +44,18 @@ impl SmoothChord {
 
 /// The chord of a ray of unit direction, from outside, in a closed convex surface: two intersections. `None` if it misses.
 pub fn chord<R: Real>(surface: &Surface, ray: &Ray<R>) -> Option<R> {
-    let enters = entry(surface, ray)?;
-    Some(leaving(surface, ray, enters.t)? - enters.t)
+    let enters = entry(surface, ray, Reach::whole())?;
+    Some(leaving(surface, ray, Reach { from: enters.t, ..Reach::whole() })? - enters.t)
 }
 
-fn entry<R: Real>(surface: &Surface, ray: &Ray<R>) -> Option<Hit<R>> {
-    surface.hit(ray, Reach::whole().only(Crossing::Entering))
+fn entry<R: Real>(surface: &Surface, ray: &Ray<R>, reach: Reach<R>) -> Option<Hit<R>> {
+    surface.hit(ray, reach.only(Crossing::Entering))
 }
 
-/// Where a ray leaves that enters there. A ray that grazes may be found to enter and not to leave: there is nothing between.
-fn leaving<R: Real>(surface: &Surface, ray: &Ray<R>, enters: R) -> Option<R> {
-    let beyond = Reach { from: enters, ..Reach::whole() };
-    surface.hit(ray, beyond.only(Crossing::Leaving)).map(|leaves| leaves.t)
+/// Where a ray leaves that enters where it is first in reach. A ray that grazes may be found to enter and not to leave: there is
+/// nothing between.
+fn leaving<R: Real>(surface: &Surface, ray: &Ray<R>, reach: Reach<R>) -> Option<R> {
+    surface.hit(ray, reach.only(Crossing::Leaving)).map(|leaves| leaves.t)
 }
 
 /// The attribute of smooth convex bodies that are looked through. The distance of two chords is that of their lengths, in
@@ -98,7 +98,8 @@ impl<'a, R: Real> SmoothChords<'a, R> {
         self.memo.recall(line, || {
             let begin =
                 |hit: Hit<R>| (Some(SmoothChord { squared: UNKNOWN, normal: f32s(hit.normal) }), hit.t);
-            entry(self.lines.surface(), &self.lines.ray(line)).map_or((None, R::of(0.0)), begin)
+            let entry = entry(self.lines.surface(), &self.lines.ray(line), Reach::whole().in_f32());
+            entry.map_or((None, R::of(0.0)), begin)
         })
     }
 }
@@ -126,7 +127,8 @@ impl<R: Real> Attribute for SmoothChords<'_, R> {
         let Some(begun) = output.filter(|chord| !chord.is_finished()) else { return };
         let (known, enters) = self.begun(line);
         *output = known.filter(SmoothChord::is_finished).or_else(|| {
-            let leaves = leaving(self.lines.surface(), &self.lines.ray(line), enters).unwrap_or(enters);
+            let beyond = Reach { from: enters, ..Reach::whole().in_f32() };
+            let leaves = leaving(self.lines.surface(), &self.lines.ray(line), beyond).unwrap_or(enters);
             let squared = ((leaves - enters) * (leaves - enters)).get() as f32;
             self.memo.put(line, (Some(SmoothChord { squared, ..begun }), enters)).0
         });

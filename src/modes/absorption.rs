@@ -8,13 +8,13 @@ use rayon::prelude::*;
 
 use crate::attributes::smooth_chord::{SmoothChords, chord};
 use crate::error::{Error, Result};
-use crate::geometry::{Bounds, Ray, Real, Region};
+use crate::geometry::{Bounds, Ray, Real, Region, Vec3};
 use crate::modes::Control;
 use crate::modes::project::tiles;
-use crate::modes::raytrace::{Picture, Tracing, Work};
+use crate::modes::raytrace::{Picture, Shadow, Tracing, Work};
 use crate::ritree::{Answer, BuildCounts, Cache, Descent, RiTree};
 use crate::scene::trace::{Camera, Object, World};
-use crate::surface::{Slabs, Surface};
+use crate::surface::Surface;
 
 /// What is left of the light on the way through half a body's longest side: its opacity is one half (§3.7).
 const LET_THROUGH: f64 = 0.5;
@@ -93,11 +93,13 @@ impl<'a, R: Real> Bodies<'a, R> {
     /// # Errors
     /// [`Error::Interrupted`] within a tile's time of a request to stop.
     pub fn lengths(&self, camera: &Camera, size: (u32, u32), control: &Control) -> Result<Lengths> {
+        let shadow = |body: &Body<R>| Shadow::new(body.surface, &body.bounds, camera, size);
+        let shadows: Vec<_> = self.bodies.iter().map(shadow).collect();
         let tiles: Vec<(Region, Lengths)> = tiles(size)
             .into_par_iter()
             .map(|region| {
                 control.check()?;
-                let (mut tile, operations) = R::count(|| self.tile(camera, size, &region));
+                let (mut tile, operations) = R::count(|| self.tile(camera, size, &shadows, &region));
                 tile.work.operations = operations;
                 control.advance(region.pixels() as u64);
                 Ok((region, tile))
@@ -121,19 +123,29 @@ impl<'a, R: Real> Bodies<'a, R> {
         Ok(all)
     }
 
-    fn tile(&self, camera: &Camera, size: (u32, u32), region: &Region) -> Lengths {
+    fn tile(
+        &self,
+        camera: &Camera,
+        size: (u32, u32),
+        shadows: &[Option<Shadow>],
+        region: &Region,
+    ) -> Lengths {
         let mut tile = Lengths::default();
-        let mut descents: Vec<_> =
-            self.bodies.iter().map(|body| body.tree.as_ref().map(RiTree::descent)).collect();
+        let mut askers: Vec<_> = self.bodies.iter().map(|body| body.asker(camera)).collect();
         let mut rays = camera.rays::<R>(size);
         for (column, row) in region.places() {
-            let ray = rays.through([f64::from(column) + 0.5, f64::from(row) + 0.5]);
+            let place = [f64::from(column) + 0.5, f64::from(row) + 0.5];
+            let ray = rays.through(place);
             let mut light = R::of(1.0);
             let traced_before = tile.work.traced;
             tile.work.rays += 1;
-            for (body, descent) in self.bodies.iter().zip(&mut descents) {
+            for ((body, asker), shadow) in self.bodies.iter().zip(&mut askers).zip(shadows) {
+                if !shadow.as_ref().is_some_and(|shadow| shadow.holds(place)) {
+                    tile.lengths.push(0.0);
+                    continue;
+                }
                 let length =
-                    body.length(&ray, descent.as_mut(), &self.cache, &mut tile.work) * R::of(1.0 / body.unit);
+                    body.length(&ray, asker.as_mut(), &self.cache, &mut tile.work) * R::of(1.0 / body.unit);
                 if length.get() > 0.0 {
                     // The ray may be at its second body: greys multiply, in whatever order.
                     light = light * R::of(LET_THROUGH).powf(length.get());
@@ -160,23 +172,31 @@ impl<'a, R: Real> Bodies<'a, R> {
     }
 }
 
-impl<R: Real> Body<'_, R> {
-    /// The length of a ray of unit direction from outside in the body, mm.
+/// Asks a body's tree for rays from one camera.
+struct Asker<'t, 'a, R: Real> {
+    descent: Descent<'t, SmoothChords<'a, R>>,
+    /// Where the camera is, off the tree's middle.
+    eye: Vec3<R>,
+}
+
+impl<'a, R: Real> Body<'a, R> {
+    fn asker(&self, camera: &Camera) -> Option<Asker<'_, 'a, R>> {
+        let tree = self.tree.as_ref()?;
+        Some(Asker { descent: tree.descent(), eye: tree.attribute().lines().off(Vec3::of(camera.eye())) })
+    }
+
+    /// The length in the body of a ray of unit direction from a camera outside of it, mm.
     fn length(
         &self,
         ray: &Ray<R>,
-        tree: Option<&mut Descent<'_, SmoothChords<'_, R>>>,
+        asker: Option<&mut Asker<'_, '_, R>>,
         cache: &Cache,
         work: &mut Work,
     ) -> R {
-        let is_met = Slabs::new(ray).stretch(&self.bounds).is_some_and(|(_, far)| far.get() > 0.0);
-        if !is_met {
-            return R::of(0.0);
-        }
-        if let Some(tree) = tree {
+        if let Some(Asker { descent, eye }) = asker {
             work.queries += 1;
-            let line = tree.tree().attribute().lines().point(ray);
-            let known = match tree.query(line, cache) {
+            let line = descent.tree().attribute().lines().point_from(*eye, ray.dir);
+            let known = match descent.query(line, cache) {
                 None => Some(None),
                 Some(Answer::Interpolated(known)) => Some(known),
                 Some(Answer::Trace(_)) => None,
