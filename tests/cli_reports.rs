@@ -81,7 +81,7 @@ fn tracing_writes_a_picture_its_map_and_a_record_that_tells_the_error() {
     let small = ["trace", "random-volumes", "--count", "3", "--seed", "2", "--size", "40x30", "-o", "out"];
     let run = chordfield(
         folder.path(),
-        &[&small[..], &["--map", "--compare", "--json", "--samples", "4"]].concat(),
+        &[&small[..], &["--map", "--compare", "--rounds", "3", "--json", "--samples", "4"]].concat(),
     );
     let record = summary(&run);
     assert!(record["exact"]["mean_rgb_error"].as_f64().expect("an error") < 0.05, "{record}");
@@ -90,8 +90,14 @@ fn tracing_writes_a_picture_its_map_and_a_record_that_tells_the_error() {
     assert_eq!(files(&folder.path().join("out")), written);
 
     for speed_up in ["first_view", "warm"] {
-        assert!(record["exact"][speed_up]["speed_up"].as_f64().expect("a speed-up") > 0.0, "{record}");
+        let speed_up = &record["exact"][speed_up];
+        let range = [0, 1].map(|end| speed_up["range"][end].as_f64().expect("an end of the range"));
+        let median = speed_up["speed_up"].as_f64().expect("a speed-up");
+        assert!(0.0 < range[0] && range[0] <= median && median <= range[1], "{record}");
     }
+    assert_eq!(record["exact"]["rounds"], 3);
+    let alone = chordfield(folder.path(), &[&small[..], &["--rounds", "3"]].concat());
+    assert_eq!(alone.status.code(), Some(2), "rounds of nothing");
 
     let looked_through = [&small[..], &["--application", "absorption", "--compare", "--json"]].concat();
     let record = summary(&chordfield(folder.path(), &looked_through));

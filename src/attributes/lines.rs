@@ -81,6 +81,7 @@ impl<'a> SurfaceLines<'a> {
             scheme: Scheme::Simplicial,
             // Beside a fold, lines between five that hit may pass the surface by.
             parts: self.is_convex,
+            tells_joined: self.tells_joined(),
         }
     }
 
@@ -172,7 +173,7 @@ impl<'a> SurfaceLines<'a> {
     /// surface and not on two parts of it, one behind the other: the way between them runs across the normals' mean. Of places on a
     /// sphere it does exactly. The normals of meshes are not those of their faces, and say nothing of it.
     pub(super) fn are_joined<R: Real>(&self, lines: [LinePoint; 2], seen: [&Seen; 2]) -> bool {
-        if self.is_convex || matches!(self.surface, Surface::Mesh(_)) {
+        if self.is_convex || !self.tells_joined() {
             return true;
         }
         let [a, b] = [0, 1].map(|i| self.place_of::<R>(&lines[i], seen[i].depth));
@@ -184,6 +185,10 @@ impl<'a> SurfaceLines<'a> {
         let along = way.dot(mean);
         let room = R::of(JOINED_SINE * JOINED_SINE) * way.dot(way) + R::of(DEPTH_NOISE * DEPTH_NOISE);
         along * along <= room * mean.dot(mean)
+    }
+
+    fn tells_joined(&self) -> bool {
+        self.is_convex || !matches!(self.surface, Surface::Mesh(_))
     }
 
     /// Where a line is at a depth, from the middle: across the axis and along it, box units.

@@ -4,7 +4,7 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 use crate::linespace::LinePoint;
 
-/// The samples remembered, at most: a megabyte of exit rays, made when the first line is sampled. They stand beside the cache of
+/// The samples remembered, at most: little more than a megabyte of exit rays, made when the first line is sampled. They stand beside the cache of
 /// nodes, and do not grow.
 const PLACES: usize = 1 << 13;
 

@@ -157,7 +157,8 @@ impl<R: Real> Attribute for SmoothChords<'_, R> {
 
     fn interpolate(&self, parts: &[(R, &Self::Output)]) -> Self::Output {
         let known = || parts.iter().filter_map(|(weight, chord)| chord.as_ref().map(|c| (*weight, c)));
-        let squared = known().fold(R::of(0.0), |sum, (weight, c)| sum + weight * R::of(c.squared.into()));
+        let squared = known().map(|(weight, c)| weight * R::of(c.squared.into()));
+        let squared = squared.reduce(|sum, part| sum + part)?;
         // Extrapolated beyond the outline, a square would be negative.
         let squared = squared.get().max(0.0) as f32;
         Some(SmoothChord { squared, normal: known().next()?.1.normal })

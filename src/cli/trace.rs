@@ -1,9 +1,9 @@
 //! `chordfield trace`.
 
+mod record;
+
 use std::io::Write;
 use std::time::Instant;
-
-use serde::Serialize;
 
 use super::args::{Application, InterpolationArg, MethodArg, TraceArgs};
 use super::{Session, method, print};
@@ -11,125 +11,13 @@ use crate::error::{Error, Result};
 use crate::geometry::{Counted, Real};
 use crate::modes::Control;
 use crate::modes::absorption::{Bodies, Lengths};
-use crate::modes::raytrace::{Picture, Renderer, Samples, Tracing, Trees, Work};
+use crate::modes::raytrace::{Picture, Renderer, Samples, Tracing, Trees};
 use crate::output::projection::safe_name;
 use crate::output::{create_folder, json, picture, remove_stale};
 use crate::ritree::BuildCounts;
 use crate::scene::panel::MAX_PIXELS;
 use crate::scene::trace::{self, Camera, Recipe, World};
-
-/// A run's record: what was rendered, how, and what it took.
-#[derive(Debug, Serialize)]
-struct Record {
-    scene: String,
-    application: Application,
-    objects: usize,
-    size: [u32; 2],
-    samples: u32,
-    method: &'static str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    settings: Option<Trees>,
-    views: usize,
-    threads: usize,
-    run: Run,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    exact: Option<Comparison>,
-}
-
-/// One rendering of all views.
-#[derive(Debug, Default, Serialize)]
-struct Run {
-    seconds: f64,
-    /// Of one thread, for each ray: from the camera, turned, or to a light.
-    nanoseconds_per_ray: f64,
-    /// What each view took; trees live from the first to the last.
-    of_views: Vec<Took>,
-    #[serde(flatten)]
-    work: Work,
-    /// The share of pixels with a ray traced through an object that has a tree.
-    traced_pixels: f64,
-    tree_bytes: usize,
-    #[serde(flatten)]
-    build: BuildCounts,
-}
-
-impl Run {
-    /// Adds what it took to make the world ready to the first view, and sums up.
-    fn count_in(&mut self, seconds: f64) {
-        if let Some(first) = self.of_views.first_mut() {
-            first.seconds += seconds;
-        }
-        self.seconds = Took::sum(&self.of_views).seconds;
-        let of_threads = 1e9 * self.seconds * rayon::current_num_threads() as f64;
-        self.nanoseconds_per_ray = of_threads / self.work.rays.max(1) as f64;
-    }
-}
-
-/// The same views traced exactly.
-#[derive(Debug, Serialize)]
-struct Comparison {
-    seconds: f64,
-    nanoseconds_per_ray: f64,
-    #[serde(flatten)]
-    work: Work,
-    /// The mean distance of colours, sRGB from 0 to 1 per channel.
-    mean_rgb_error: f64,
-    /// Absorption: the mean difference of lengths, in half the longest side of the body.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    mean_length_error: Option<f64>,
-    /// Of all views, building included.
-    #[serde(flatten)]
-    all: SpeedUp,
-    /// Of the first view, by trees that have seen nothing.
-    first_view: SpeedUp,
-    /// Of the others, by trees that have seen those before.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    further_views: Option<SpeedUp>,
-    /// Of all views once more, by trees that have seen them all.
-    warm: SpeedUp,
-}
-
-/// What some views took.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
-struct Took {
-    seconds: f64,
-    #[serde(skip_serializing_if = "is_zero")]
-    operations: u64,
-}
-
-fn is_zero(count: &u64) -> bool {
-    *count == 0
-}
-
-impl Took {
-    fn sum(views: &[Self]) -> Self {
-        views.iter().fold(Self::default(), |sum, view| Self {
-            seconds: sum.seconds + view.seconds,
-            operations: sum.operations + view.operations,
-        })
-    }
-}
-
-/// What exact tracing took over what trees did.
-#[derive(Clone, Copy, Debug, Serialize)]
-struct SpeedUp {
-    /// In seconds.
-    speed_up: f64,
-    /// In floating-point operations, if they were counted.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    operations_speed_up: Option<f64>,
-}
-
-impl SpeedUp {
-    fn of(exact: &[Took], own: &[Took]) -> Self {
-        let (exact, own) = (Took::sum(exact), Took::sum(own));
-        let is_counted = exact.operations > 0;
-        Self {
-            speed_up: exact.seconds / own.seconds,
-            operations_speed_up: is_counted.then(|| exact.operations as f64 / own.operations.max(1) as f64),
-        }
-    }
-}
+use record::{Comparison, Record, Round, Run, SpeedUps, Took};
 
 /// A world made ready for what is made of its rays, and how long that took.
 struct Stage<'a, R: Real> {
@@ -230,8 +118,10 @@ fn run_in<R: Real>(args: &TraceArgs, session: &Session, out: &mut dyn Write) -> 
             picture::write_map(&args.output.join(format!("{label}-map.png")), &of_view.picture)?;
         }
     }
-    let exact =
-        args.compare.then(|| compare(&stage, &world, args, &samples, session, &made, &run)).transpose()?;
+    let exact = args
+        .compare
+        .then(|| compare(&stage, &world, tracing, args, &samples, session, (&made, &run)))
+        .transpose()?;
     let (method, settings) = match tracing {
         Tracing::RiTree(settings) => (MethodArg::Ritree, Some(settings)),
         Tracing::Exact => (MethodArg::Exact, None),
@@ -310,36 +200,45 @@ fn render<R: Real>(
     Ok((made, run))
 }
 
-/// The views of a stage that has made them once, traced exactly and made once more.
+/// The views of a stage that has made them once, traced exactly and made once more; and all of that again, to time it.
 fn compare<R: Real>(
     stage: &Stage<R>,
     world: &World,
+    tracing: Tracing,
     args: &TraceArgs,
     samples: &Samples,
     session: &Session,
-    made: &[Made],
-    run: &Run,
+    (made, run): (&[Made], &Run),
 ) -> Result<Comparison> {
-    let by_rays = Stage::<R>::new(world, Tracing::Exact, args.application)?;
-    let (exact, mut took) = render(&by_rays, world, args, samples, session)?;
-    took.count_in(by_rays.seconds);
-    let (_, again) = render(stage, world, args, samples, session)?;
+    let make = |stage: &Stage<R>| render(stage, world, args, samples, session);
+    let make_anew = |tracing| -> Result<_> {
+        let stage = Stage::<R>::new(world, tracing, args.application)?;
+        let (made, mut run) = make(&stage)?;
+        run.count_in(stage.seconds);
+        Ok((stage, made, run))
+    };
+    let (_, exact, took) = make_anew(Tracing::Exact)?;
+    let (_, again) = make(stage)?;
+    let views = |run: &Run| run.of_views.clone();
+    let mut rounds = vec![Round { own: views(run), exact: views(&took), warm: views(&again) }];
+    for _ in 1..args.rounds {
+        let (stage, _, own) = make_anew(tracing)?;
+        let (_, _, exact) = make_anew(Tracing::Exact)?;
+        let (_, warm) = make(&stage)?;
+        rounds.push(Round { own: own.of_views, exact: exact.of_views, warm: warm.of_views });
+    }
     let mean = |errors: Vec<f64>| errors.iter().sum::<f64>() / errors.len() as f64;
     let pairs = || made.iter().zip(&exact);
     let lengths: Vec<f64> = pairs()
         .filter_map(|(own, exact)| Some(own.lengths.as_ref()?.mean_difference(exact.lengths.as_ref()?)))
         .collect();
-    let further_views =
-        (run.of_views.len() > 1).then(|| SpeedUp::of(&took.of_views[1..], &run.of_views[1..]));
     Ok(Comparison {
         seconds: took.seconds,
         nanoseconds_per_ray: took.nanoseconds_per_ray,
         work: took.work,
         mean_rgb_error: mean(pairs().filter_map(|(a, b)| a.picture.mean_distance(&b.picture)).collect()),
         mean_length_error: (!lengths.is_empty()).then(|| mean(lengths)),
-        all: SpeedUp::of(&took.of_views, &run.of_views),
-        first_view: SpeedUp::of(&took.of_views[..1], &run.of_views[..1]),
-        further_views,
-        warm: SpeedUp::of(&took.of_views, &again.of_views),
+        rounds: rounds.len(),
+        speed_ups: SpeedUps::of(&rounds),
     })
 }

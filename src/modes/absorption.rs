@@ -11,10 +11,10 @@ use crate::error::{Error, Result};
 use crate::geometry::{Bounds, Ray, Real, Region, Vec3};
 use crate::modes::Control;
 use crate::modes::project::tiles;
-use crate::modes::raytrace::{Picture, Shadow, Tracing, Work};
+use crate::modes::raytrace::{Picture, Silhouette, Tracing, Work};
 use crate::ritree::{Answer, BuildCounts, Cache, Descent, RiTree};
 use crate::scene::trace::{Camera, Object, World};
-use crate::surface::Surface;
+use crate::surface::{Slabs, Surface};
 
 /// What is left of the light on the way through half a body's longest side: its opacity is one half (§3.7).
 const LET_THROUGH: f64 = 0.5;
@@ -93,13 +93,13 @@ impl<'a, R: Real> Bodies<'a, R> {
     /// # Errors
     /// [`Error::Interrupted`] within a tile's time of a request to stop.
     pub fn lengths(&self, camera: &Camera, size: (u32, u32), control: &Control) -> Result<Lengths> {
-        let shadow = |body: &Body<R>| Shadow::new(body.surface, &body.bounds, camera, size);
-        let shadows: Vec<_> = self.bodies.iter().map(shadow).collect();
+        let silhouette = |body: &Body<R>| Silhouette::new(body.surface, &body.bounds, camera, size);
+        let silhouettes: Vec<_> = self.bodies.iter().map(silhouette).collect();
         let tiles: Vec<(Region, Lengths)> = tiles(size)
             .into_par_iter()
             .map(|region| {
                 control.check()?;
-                let (mut tile, operations) = R::count(|| self.tile(camera, size, &shadows, &region));
+                let (mut tile, operations) = R::count(|| self.tile(camera, size, &silhouettes, &region));
                 tile.work.operations = operations;
                 control.advance(region.pixels() as u64);
                 Ok((region, tile))
@@ -127,7 +127,7 @@ impl<'a, R: Real> Bodies<'a, R> {
         &self,
         camera: &Camera,
         size: (u32, u32),
-        shadows: &[Option<Shadow>],
+        silhouettes: &[Option<Silhouette>],
         region: &Region,
     ) -> Lengths {
         let mut tile = Lengths::default();
@@ -139,8 +139,10 @@ impl<'a, R: Real> Bodies<'a, R> {
             let mut light = R::of(1.0);
             let traced_before = tile.work.traced;
             tile.work.rays += 1;
-            for ((body, asker), shadow) in self.bodies.iter().zip(&mut askers).zip(shadows) {
-                if !shadow.as_ref().is_some_and(|shadow| shadow.holds(place)) {
+            for ((body, asker), silhouette) in self.bodies.iter().zip(&mut askers).zip(silhouettes) {
+                // A body beside the camera may lie behind the ray.
+                let is_before = |silhouette: &Silhouette| silhouette.is_bounded() || body.is_before(&ray);
+                if !silhouette.as_ref().is_some_and(|s| s.holds(place) && is_before(s)) {
                     tile.lengths.push(0.0);
                     continue;
                 }
@@ -185,7 +187,12 @@ impl<'a, R: Real> Body<'a, R> {
         Some(Asker { descent: tree.descent(), eye: tree.attribute().lines().off(Vec3::of(camera.eye())) })
     }
 
-    /// The length in the body of a ray of unit direction from a camera outside of it, mm.
+    /// Whether a ray meets its box ahead.
+    fn is_before(&self, ray: &Ray<R>) -> bool {
+        Slabs::new(ray).stretch(&self.bounds).is_some_and(|(_, far)| far.get() > 0.0)
+    }
+
+    /// The length in the body of a ray of unit direction from a camera outside of its box, mm.
     fn length(
         &self,
         ray: &Ray<R>,
@@ -213,6 +220,8 @@ impl<'a, R: Real> Body<'a, R> {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::geometry::Counted;
     use crate::modes::raytrace::Trees;
@@ -248,6 +257,20 @@ mod tests {
             assert_eq!(work.queries, work.interpolated + work.traced);
             assert_eq!(plain.traced.iter().any(|t| *t), work.traced > 0);
         }
+        // From among the bodies, some of which lie beside the camera and behind it.
+        let eye = DVec3::new(0.0, 0.0, 0.0);
+        let among = Camera::new(eye, DVec3::X, DVec3::Z, 90.0).expect("a camera");
+        let is_outside = |object: &Object| !object.surface.bounds().contains(eye);
+        let world = World { objects: world.objects.into_iter().filter(is_outside).collect(), ..world };
+        assert!(world.objects.len() > 1, "bodies to look at");
+        let [exact, near] = [Tracing::Exact, trees(0.01)].map(|tracing| {
+            let bodies = Bodies::<f64>::new(&world, tracing).expect("bodies");
+            bodies.lengths(&among, SIZE, &Control::none()).expect("done")
+        });
+        let wrong =
+            exact.lengths.iter().zip(&near.lengths).filter(|(exact, near)| **exact == 0.0 && **near > 0.5);
+        assert_eq!(wrong.count(), 0, "what lies behind is not looked through");
+        assert!(exact.lengths.iter().any(|length| *length > 0.5));
         let bowl = open("tomatoes", Recipe { seed: 1, count: 1 }).expect("a world");
         let refused = Bodies::<f64>::new(&bowl, Tracing::Exact).err().expect("a table is no body");
         assert!(refused.to_string().contains("table"), "{refused}");

@@ -29,6 +29,9 @@ pub struct Sampling {
     /// Whether lines are interpolated in a cell that holds a discontinuity, if they lie in a simplex whose corners fit together.
     /// Not for surfaces that may hide parts of their own.
     pub parts: bool,
+    /// Whether [`are_joined`](Attribute::are_joined) proves what it says: lines are then interpolated in a simplex as well where
+    /// the corners of a cell are all joined, but directions too far apart.
+    pub tells_joined: bool,
 }
 
 impl Sampling {
@@ -39,6 +42,7 @@ impl Sampling {
         remembers: false,
         scheme: Scheme::Quadrilinear,
         parts: false,
+        tells_joined: false,
     };
 }
 

@@ -2,7 +2,7 @@
 //! (§2.5).
 
 use super::Parameters;
-use super::attribute::{Attribute, Sampling, Scheme};
+use super::attribute::{Attribute, Sampling};
 use super::cell::{Kind, Place, Reason};
 use super::interpolant::{Corners, Simplex, has_simplex, linear_weights};
 use crate::geometry::Real;
@@ -19,11 +19,9 @@ impl Place {
         let sides = sides(attribute, corners);
         let is_defined = |side: &[usize]| linear_weights(side, [A::Real::of(0.5); 4]).is_some();
         let may_be_located = sides.iter().any(|&class| is_defined(&side(attribute, corners, class)));
-        let Sampling { scheme, parts, .. } = attribute.sampling();
+        let Sampling { parts, tells_joined, .. } = attribute.sampling();
         // Where no discontinuity is, simplices differ only in how far directions are apart.
-        let is_one_part = why == Reason::Angle
-            && scheme == Scheme::Simplicial
-            && self.are_joined(attribute, corners, 0..16);
+        let is_one_part = why == Reason::Angle && tells_joined && self.are_joined(attribute, corners, 0..16);
         let by_simplices = parts || is_one_part;
         let may_hold_simplex =
             by_simplices && holds_simplex(attribute, corners, |c| attribute.outline_class(c));

@@ -102,7 +102,8 @@ impl<R: Real> Reach<R> {
         }
     }
 
-    /// As this, for hits that are told in f32: a part is a small share of its surface, and a place on it nearer than that.
+    /// As this, for hits that are told in f32: a place is then known to 1e-7 of a part, which is a small share of its surface, and a
+    /// normal to some 1e-4 of what it turns by on the part.
     pub fn in_f32(self) -> Self {
         Self { accuracy: IN_F32, ..self }
     }

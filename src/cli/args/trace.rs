@@ -49,6 +49,10 @@ pub struct TraceArgs {
     #[arg(long)]
     pub compare: bool,
 
+    /// With --compare: do both ways so many times, in turn, and tell the median and the range of the speed-ups.
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "compare", value_parser = clap::value_parser!(u16).range(1..=999))]
+    pub rounds: u16,
+
     /// Count floating-point operations instead of being quick. Seconds then mean nothing.
     #[arg(long)]
     pub count_operations: bool,

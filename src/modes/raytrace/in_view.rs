@@ -1,25 +1,28 @@
-//! Which objects the pixels of a tile may show: those whose boxes' shadows on the picture reach the tile (item buffers, Weghorst,
-//! Hooper & Greenberg 1984, doi:10.1145/357332.357335).
+//! Which objects a pixel may show: those whose silhouettes hold it (item buffers, Weghorst, Hooper & Greenberg 1984,
+//! doi:10.1145/357332.357335).
 //!
-//! What a pixel shows in a flat mirror is what it would show of the mirrored camera, so that boxes cast shadows on the picture
-//! from there as well. Exact tracing and trees both hold rays against these objects alone, and it takes them no operation.
+//! What a pixel shows in a flat mirror is what it would show of the mirrored camera, so that objects have silhouettes as seen from
+//! there as well. Exact tracing and trees both hold rays against these objects alone, and it takes them no operation.
 
-use super::shadow::Shadow;
+use super::silhouette::Silhouette;
 use crate::geometry::{Bounds, Region};
 use crate::scene::trace::{Camera, Object};
 use crate::surface::Surface;
 use crate::surface::optics::Optics;
 
 /// Objects and where in the picture they may be seen, in the order in which rays are held against them.
-type Seen = Vec<(u32, Shadow)>;
+type Visible = Vec<(u32, Silhouette)>;
+
+/// So many flat mirrors have silhouettes of their own; whatever is seen in others may be anywhere.
+const MOST_MIRRORS: usize = 4;
 
 /// Where in a picture, or on a part of it, objects may be seen.
 pub struct InView {
     /// By rays that come from anywhere.
-    anyhow: Seen,
-    straight: Seen,
+    anyhow: Visible,
+    straight: Visible,
     /// In flat mirrors, by the mirror's index.
-    mirrored: Vec<(u32, Seen)>,
+    mirrored: Vec<(u32, Visible)>,
 }
 
 impl InView {
@@ -32,10 +35,10 @@ impl InView {
         order: &[u32],
     ) -> Self {
         let seen_by = |camera: &Camera| {
-            let shadow = |&i: &u32| {
-                Some((i, Shadow::new(&objects[i as usize].surface, &boxes[i as usize], camera, size)?))
+            let silhouette = |&i: &u32| {
+                Some((i, Silhouette::new(&objects[i as usize].surface, &boxes[i as usize], camera, size)?))
             };
-            order.iter().filter_map(shadow).collect()
+            order.iter().filter_map(silhouette).collect()
         };
         let in_mirror = |&mirror: &u32| {
             let Object { surface: Surface::Disc(disc), material, .. } = &objects[mirror as usize] else {
@@ -46,15 +49,17 @@ impl InView {
             Some((mirror, seen_by(&image)))
         };
         Self {
-            anyhow: order.iter().map(|&index| (index, Shadow::ANYWHERE)).collect(),
+            anyhow: order.iter().map(|&index| (index, Silhouette::ANYWHERE)).collect(),
             straight: seen_by(camera),
-            mirrored: order.iter().filter_map(in_mirror).collect(),
+            mirrored: order.iter().filter_map(in_mirror).take(MOST_MIRRORS).collect(),
         }
     }
 
     /// On a tile of it.
     pub fn on(&self, tile: &Region) -> Self {
-        let reach = |seen: &Seen| seen.iter().filter(|(_, shadow)| shadow.reaches(tile)).cloned().collect();
+        let reach = |seen: &Visible| {
+            seen.iter().filter(|(_, silhouette)| silhouette.reaches(tile)).cloned().collect()
+        };
         Self {
             anyhow: self.anyhow.clone(),
             straight: reach(&self.straight),
@@ -63,17 +68,17 @@ impl InView {
     }
 
     /// By rays that come from anywhere.
-    pub fn anyhow(&self) -> &[(u32, Shadow)] {
+    pub fn anyhow(&self) -> &[(u32, Silhouette)] {
         &self.anyhow
     }
 
     /// By rays from the camera.
-    pub fn straight(&self) -> &[(u32, Shadow)] {
+    pub fn straight(&self) -> &[(u32, Silhouette)] {
         &self.straight
     }
 
     /// By rays from the camera that an object mirrored.
-    pub fn mirrored_by(&self, object: usize) -> &[(u32, Shadow)] {
+    pub fn mirrored_by(&self, object: usize) -> &[(u32, Silhouette)] {
         let of_mirror = self.mirrored.iter().find(|(index, _)| *index as usize == object);
         of_mirror.map_or(&self.anyhow, |(_, seen)| seen)
     }
@@ -115,10 +120,10 @@ mod tests {
                 let in_view = whole.on(&Region { columns: column..column + 1, rows: row..row + 1 });
                 let place = [f64::from(column) + 0.3, f64::from(row) + 0.9];
                 let ray = rays.through(place);
-                let mut hold = |ray: &Ray<f64>, seen: &[(u32, Shadow)], mirror: Option<usize>| {
+                let mut hold = |ray: &Ray<f64>, seen: &[(u32, Silhouette)], mirror: Option<usize>| {
                     for (index, object) in objects.iter().enumerate().filter(|(i, _)| Some(*i) != mirror) {
                         let is_met = object.surface.hit(ray, Reach::whole()).is_some();
-                        let mut at_place = seen.iter().filter(|(_, shadow)| shadow.holds(place));
+                        let mut at_place = seen.iter().filter(|(_, silhouette)| silhouette.holds(place));
                         met[usize::from(mirror.is_some())] += usize::from(is_met);
                         let is_seen = at_place.any(|(i, _)| *i as usize == index);
                         assert!(

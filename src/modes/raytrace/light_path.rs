@@ -137,14 +137,17 @@ impl<'t, 'a, R: Real> LightPath<'t, 'a, R> {
             Bundle::FromImage(None) | Bundle::Scattered => in_view.anyhow(),
         };
         let place = self.place;
-        let objects = objects.iter().filter(|(_, shadow)| shadow.holds(place));
+        let objects = objects.iter().filter(|(_, silhouette)| silhouette.holds(place));
         let slabs = LazyCell::new(|| Slabs::new(ray));
         let mut best: Option<(usize, Sight<R>)> = None;
-        for index in objects.map(|(index, _)| *index as usize).filter(|&index| Some(index) != left) {
+        for (index, silhouette) in objects.map(|(index, silhouette)| (*index as usize, silhouette)) {
+            if Some(index) == left {
+                continue;
+            }
             let to = best.as_ref().map_or(R::of(f64::INFINITY), |(_, sight)| sight.t);
             let seer = &self.seers[index];
-            // What is in view is mostly met: where a hit takes little more than a look at the box, the box is left out.
-            let sight = if bundle != Bundle::Scattered && !seer.has_tree() && seer.has_closed_form() {
+            // What is in view is mostly met: where a hit takes little more than a look at the box, that is left out.
+            let sight = if silhouette.is_bounded() && !seer.has_tree() && seer.has_closed_form() {
                 seer.trace(ray, Reach { to, ..Reach::whole() })
             } else {
                 self.sight(index, ray, &slabs, to, bundle)

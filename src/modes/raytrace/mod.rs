@@ -9,9 +9,9 @@
 //! Trees are asked for what is smooth, by rays from the camera, or from its images in flat mirrors: the first hit of a line with
 //! its normal, and the ray that leaves a mirror or a glass body. What lights see of an object with a tree is interpolated, too. All
 //! of it is kept from view to view. Where trees do not answer, where a ray starts within an object's box, for objects without a
-//! tree and after a turn at what is curved, rays are traced. Both ways look for what the camera or a light sees in its direction
-//! only, and at a sky whose noise is made once. Colours are floats to the end; a pixel depends on its rays alone, so pictures are
-//! the same bits for any number of threads.
+//! tree and after a turn at what is curved, rays are traced. Both ways look for what may be in view at a ray's pixel, or in a
+//! light's direction, only, and at a sky whose noise is made once. Colours are floats to the end; a pixel depends on its rays
+//! alone, so pictures are the same bits for any number of threads.
 
 mod around;
 mod cube;
@@ -21,7 +21,7 @@ mod light_map;
 mod light_path;
 mod picture;
 mod seer;
-mod shadow;
+mod silhouette;
 mod sky_map;
 #[cfg(test)]
 mod tests;
@@ -42,7 +42,7 @@ use in_view::InView;
 use light_path::LightPath;
 pub use picture::{Picture, Samples};
 use seer::Seer;
-pub(super) use shadow::Shadow;
+pub(super) use silhouette::Silhouette;
 use sky_map::SkyMap;
 
 /// How trees of what rays meet are grown; the defaults are the paper's.

@@ -17,7 +17,7 @@ use crate::scene::trace::{Noise, Sky};
 /// Cells of the texture along a cell of the noise's finest octave, where the sides are nearest to the sky and cells largest.
 const CELLS_PER_OCTAVE_CELL: f64 = 2.0;
 
-/// Cells along a side, at most: noise of more than 8 waves is evaluated for each ray. Textures so hold 13 MB at most.
+/// Cells along a side, at most: noise of more than 8 waves is evaluated for each ray. Textures so hold 16 MB at most.
 const MOST_CELLS: usize = 512;
 
 /// Octaves before this one are slow: halfway between two points they are the mean of both, but for no more than the finest one is

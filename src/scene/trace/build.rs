@@ -14,7 +14,7 @@ use crate::surface::{BezierPatch, Block, Disc, Shell, SmoothMesh, Sphere, Surfac
 
 /// Each object keeps what each light sees of it.
 const MOST_LIGHTS: usize = 8;
-/// All objects are held against each ray.
+/// All objects are held against each ray that curved ones have turned.
 const MOST_OBJECTS: usize = 1_000;
 
 /// The world that `text` describes, with mesh files from `folder`.

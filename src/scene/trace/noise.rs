@@ -22,12 +22,7 @@ impl Noise {
         Self { seed }
     }
 
-    /// Noise of several octaves, each of half the amplitude: 0 to 1.
-    pub fn turbulence<R: Real>(&self, place: Vec3<R>) -> R {
-        Self::share_of(self.octaves(place, 0..Self::OCTAVES))
-    }
-
-    /// What octaves add up to.
+    /// What octaves add up to, each of half the amplitude of the one before it.
     pub fn octaves<R: Real>(&self, place: Vec3<R>, octaves: Range<i32>) -> R {
         octaves.fold(R::of(0.0), |sum, octave| {
             let scale = 2f64.powi(octave);
@@ -35,7 +30,7 @@ impl Noise {
         })
     }
 
-    /// The turbulence that octaves add up to, which is seldom more than 0.7.
+    /// Turbulence, 0 to 1, of what octaves add up to, which is seldom more than 0.7.
     pub fn share_of<R: Real>(sum: R) -> R {
         (R::of(0.5) + sum * R::of(0.7)).max(R::of(0.0)).min(R::of(1.0))
     }
