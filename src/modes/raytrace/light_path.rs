@@ -131,23 +131,21 @@ impl<'t, 'a, R: Real> LightPath<'t, 'a, R> {
     /// The nearest object along a ray.
     fn nearest(&mut self, ray: &Ray<R>, left: Option<usize>, bundle: Bundle) -> Option<(usize, Sight<R>)> {
         let in_view = self.in_view;
-        let objects = match bundle {
-            Bundle::FromEye => in_view.straight(),
+        let known = match bundle {
+            Bundle::FromEye => Some(in_view.straight()),
             Bundle::FromImage(Some(mirror)) => in_view.mirrored_by(mirror),
-            Bundle::FromImage(None) | Bundle::Scattered => in_view.anyhow(),
+            Bundle::FromImage(None) | Bundle::Scattered => None,
         };
+        let (objects, is_known) = (known.unwrap_or(in_view.anyhow()), known.is_some());
         let place = self.place;
         let objects = objects.iter().filter(|(_, silhouette)| silhouette.holds(place));
         let slabs = LazyCell::new(|| Slabs::new(ray));
         let mut best: Option<(usize, Sight<R>)> = None;
-        for (index, silhouette) in objects.map(|(index, silhouette)| (*index as usize, silhouette)) {
-            if Some(index) == left {
-                continue;
-            }
+        for index in objects.map(|(index, _)| *index as usize).filter(|&index| Some(index) != left) {
             let to = best.as_ref().map_or(R::of(f64::INFINITY), |(_, sight)| sight.t);
             let seer = &self.seers[index];
             // What is in view is mostly met: where a hit takes little more than a look at the box, that is left out.
-            let sight = if silhouette.is_bounded() && !seer.has_tree() && seer.has_closed_form() {
+            let sight = if is_known && !seer.has_tree() && seer.has_closed_form() {
                 seer.trace(ray, Reach { to, ..Reach::whole() })
             } else {
                 self.sight(index, ray, &slabs, to, bundle)
